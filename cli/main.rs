@@ -1,0 +1,2 @@
+//! The resurvey command line.
+fn main() {}

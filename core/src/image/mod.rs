@@ -1,0 +1,7 @@
+//! Rasters: label images, their PNG form, connected components.
+
+mod label;
+mod raster;
+
+pub use label::LabelImage;
+pub use raster::Raster;

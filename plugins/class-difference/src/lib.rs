@@ -1,0 +1,2 @@
+//! Change detector on class differences.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! Descriptor estimator: material rectangles and dynamic objects.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! VPS matcher on the skyline alone.
+#![forbid(unsafe_code)]
