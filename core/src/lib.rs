@@ -4,7 +4,13 @@
 
 pub mod camera;
 pub mod crs;
+pub mod export;
 pub mod image;
+pub mod localize;
 pub mod mesh;
 pub mod metrics;
+pub mod plugin;
 pub mod render;
+pub mod store;
+pub mod update;
+pub mod version;

@@ -10,6 +10,7 @@ pub mod descriptor;
 pub mod localization;
 pub mod position;
 pub mod region;
+pub mod service;
 
 pub use camera::{CameraModel, Intrinsics};
 pub use capture::{CameraFile, CaptureFile, PriorFile};

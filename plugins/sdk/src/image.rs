@@ -1,6 +1,7 @@
 //! Rasters and views lent to a plugin for the length of one call.
 
-use resurvey_schema::{ClassId, GridPoint, Intrinsics, Pose};
+use resurvey_schema::service::{PoseEstimate, ViewFeature};
+use resurvey_schema::{GridPoint, Intrinsics};
 
 /// A borrowed row-major image, top-left first. Rows may be padded: always go through [`row`](Self::row).
 #[derive(Clone, Copy, Debug)]
@@ -40,15 +41,6 @@ impl<'a, T: Copy> ImageRef<'a, T> {
     }
 }
 
-/// A feature that can be seen in a view: a descriptor of the map's version.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ViewFeature {
-    /// Feature id in the map.
-    pub fid: u64,
-    /// Its class.
-    pub class: ClassId,
-}
-
 /// The map as seen from a pose: what one ray per pixel hits first (Lee & Hsu, Eq. 6–14).
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
@@ -83,19 +75,6 @@ pub struct ViewImages {
     pub points: Vec<[f32; 3]>,
     /// Feature per pixel.
     pub features: Vec<u32>,
-}
-
-/// A pose with its uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseEstimate {
-    /// The pose.
-    pub pose: Pose,
-    /// Covariance over easting (m), northing (m), yaw (rad).
-    pub covariance: [[f64; 3]; 3],
-    /// 1σ of the height, metres.
-    pub height_sigma_m: f64,
-    /// 1σ of pitch and roll, radians.
-    pub tilt_sigma_rad: f64,
 }
 
 /// Photo and view of the same pose, side by side.

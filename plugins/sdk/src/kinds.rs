@@ -2,7 +2,8 @@
 
 use crate::host::Host;
 use crate::image::{Comparison, ImageRef, View};
-use resurvey_schema::{ChangeRegion, Intrinsics, Localization, Pose, Proposal};
+use resurvey_schema::service::Prior;
+use resurvey_schema::{ChangeRegion, Intrinsics, Localization, Proposal};
 use serde::de::DeserializeOwned;
 
 /// Why a plugin could not answer; the text says what was expected and what was found.
@@ -33,21 +34,6 @@ pub trait Plugin: Send + Sized + 'static {
 
     /// An instance; never called from two threads at once.
     fn create(settings: Self::Settings) -> Result<Self, Error>;
-}
-
-/// The phone's rough pose with its uncertainty, in the map frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior {
-    /// The rough pose.
-    pub pose: Pose,
-    /// 1σ of the position in plan, metres.
-    pub position_sigma_m: f64,
-    /// 1σ of the height, metres.
-    pub height_sigma_m: f64,
-    /// 1σ of the heading, radians.
-    pub yaw_sigma_rad: f64,
-    /// 1σ of pitch and roll, radians.
-    pub tilt_sigma_rad: f64,
 }
 
 /// A labelled photo and its prior.

@@ -5,7 +5,10 @@ pub mod host;
 pub mod image;
 pub mod kinds;
 
-pub use host::{ClassCounts, ClassSet, CompareRequest, Host, Level, PanoramaRequest, RayHit, ViewCounts};
-pub use image::{Comparison, ImageRef, PoseEstimate, View, ViewFeature, ViewImages};
-pub use kinds::{Detector, Error, Estimator, Photo, Plugin, Prior, Scorer, Searcher};
+pub use host::Host;
+pub use image::{Comparison, ImageRef, View, ViewImages};
+pub use kinds::{Detector, Error, Estimator, Photo, Plugin, Scorer, Searcher};
 pub use resurvey_schema as schema;
+pub use resurvey_schema::service::{
+    ClassCounts, ClassSet, CompareRequest, Level, PanoramaRequest, PoseEstimate, Prior, RayHit, ViewCounts, ViewFeature,
+};

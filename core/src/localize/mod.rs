@@ -1,0 +1,1 @@
+//! Where the phone stood: the host-driven search, the reliability gate and the heat map.

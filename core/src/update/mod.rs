@@ -1,0 +1,1 @@
+//! One capture becomes one update transaction: localize, detect, estimate, commit.

@@ -1,0 +1,1 @@
+//! The values of history: version ids, deltas, update transactions. No SQL, no file.
