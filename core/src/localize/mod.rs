@@ -1,1 +1,3 @@
 //! Where the phone stood: the host-driven search, the reliability gate and the heat map.
+
+pub mod sweep;

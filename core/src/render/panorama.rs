@@ -35,7 +35,8 @@ impl PanoramaGrid {
         let rows = words * ROWS_PER_WORD;
         let tangent_step = (highest - lowest) / rows as f64;
         let step_rad = std::f64::consts::TAU / f64::from(columns);
-        let columns = (0..columns).map(|column| (f64::from(column) * step_rad).sin_cos()).map(|(s, c)| [s, c]).collect();
+        let columns =
+            (0..columns).map(|column| (f64::from(column) * step_rad).sin_cos()).map(|(s, c)| [s, c]).collect();
         Self { rows, first_tangent: lowest + tangent_step / 2.0, tangent_step, columns }
     }
 
