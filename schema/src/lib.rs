@@ -2,6 +2,7 @@
 //! ABI. Nothing here computes.
 #![forbid(unsafe_code)]
 
+pub mod abi;
 pub mod camera;
 pub mod capture;
 pub mod changes;

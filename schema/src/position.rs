@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// map's own projected system). In files an array `[E, N, H]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 3]", into = "[f64; 3]")]
+#[repr(C)]
 pub struct GridPoint {
     /// Easting, metres.
     pub easting_m: f64,
@@ -46,6 +47,7 @@ impl From<GridPoint> for [f64; 3] {
 
 /// A WGS84 position (EPSG:4979).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Wgs84 {
     /// Latitude, degrees, north positive.
     pub latitude_deg: f64,
@@ -59,6 +61,7 @@ pub struct Wgs84 {
 /// here, degrees in files.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "PoseFile", into = "PoseFile")]
+#[repr(C)]
 pub struct Pose {
     /// Centre of projection.
     pub position: GridPoint,

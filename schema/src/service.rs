@@ -104,6 +104,7 @@ pub struct RayHit {
 
 /// A feature that can be seen in a view: a descriptor of the map's version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 pub struct ViewFeature {
     /// Feature id in the map.
     pub fid: u64,
