@@ -4,6 +4,7 @@
 pub mod host;
 pub mod image;
 pub mod kinds;
+pub mod toy;
 
 pub use host::Host;
 pub use image::{Comparison, ImageRef, View, ViewImages};
