@@ -10,5 +10,5 @@ pub mod pose;
 #[cfg(test)]
 mod tests;
 
-pub use model::{Camera, CameraError, MAX_PIXELS, MAX_SIDE_PX};
+pub use model::{Camera, CameraError, MAX_PIXELS, MAX_SIDE_PX, Pinhole};
 pub use pose::{camera_from_world, world_from_camera};

@@ -2,7 +2,7 @@
 
 use super::brown::Brown;
 use super::fisheye::Fisheye;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use resurvey_schema::{CameraFile, CameraModel, Intrinsics};
 
 /// Longest side of an image, pixels.
@@ -63,6 +63,40 @@ pub enum CameraError {
 pub struct Camera {
     intrinsics: Intrinsics,
     lens: Lens,
+}
+
+/// A camera known to keep straight lines straight: u = fx·x/z + cx, v = fy·y/z + cy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    width: u32,
+    height: u32,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+}
+
+impl Pinhole {
+    /// Columns, pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows, pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Takes camera axes to homogeneous pixels (u·z, v·z, z).
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
+    }
+
+    /// Takes (u, v, 1) to the direction in camera axes whose z is 1.
+    pub fn inverse(&self) -> Matrix3<f64> {
+        let (fx, fy) = (1.0 / self.fx, 1.0 / self.fy);
+        Matrix3::new(fx, 0.0, -self.cx * fx, 0.0, fy, -self.cy * fy, 0.0, 0.0, 1.0)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,6 +171,12 @@ impl Camera {
             Lens::Brown(_) => self.intrinsics.distortion.iter().all(|&value| value.abs() < f64::MIN_POSITIVE),
             Lens::Fisheye(_) => false,
         }
+    }
+
+    /// The camera as one that can be rasterised; `None` when it bends straight lines.
+    pub fn pinhole(&self) -> Option<Pinhole> {
+        let Intrinsics { width, height, fx, fy, cx, cy, .. } = self.intrinsics;
+        self.is_pinhole().then_some(Pinhole { width, height, fx, fy, cx, cy })
     }
 
     /// Unit direction, camera axes, that is seen at (u, v); `None` where the lens shows nothing.

@@ -1,0 +1,58 @@
+//! The depth and triangle buffers of one image.
+
+/// Per pixel, the inverse depth of the nearest triangle so far and which one it is.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Frame {
+    width: usize,
+    height: usize,
+    inverse_depths: Vec<f32>,
+    ids: Vec<u32>,
+}
+
+/// Pixels `first..end` of row `v` of a triangle whose inverse depth is `start + step · (u − first)` at column `u`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    pub(super) v: usize,
+    pub(super) first: usize,
+    pub(super) end: usize,
+    pub(super) start: f32,
+    pub(super) step: f32,
+}
+
+impl Frame {
+    /// Makes the frame empty, `width × height` pixels.
+    pub(super) fn clear(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width, height);
+        self.inverse_depths.clear();
+        self.inverse_depths.resize(width * height, 0.0);
+        self.ids.clear();
+        self.ids.resize(width * height, 0);
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    pub(super) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Ids of row `v`; 0 where nothing was drawn.
+    pub(super) fn ids(&self, v: usize) -> &[u32] {
+        &self.ids[v * self.width..(v + 1) * self.width]
+    }
+
+    /// Draws triangle `id` where it is nearer than what is there; among equals the first drawn stays.
+    pub(super) fn draw(&mut self, span: Span, id: u32) {
+        let row = span.v * self.width;
+        let depths = &mut self.inverse_depths[row + span.first..row + span.end];
+        let ids = &mut self.ids[row + span.first..row + span.end];
+        // Selects instead of a branch: the compiler turns this into vector code.
+        for (index, (nearest, winner)) in depths.iter_mut().zip(ids).enumerate() {
+            let inverse_depth = span.start + span.step * (index as i32) as f32;
+            let nearer = inverse_depth > *nearest;
+            *nearest = if nearer { inverse_depth } else { *nearest };
+            *winner = if nearer { id } else { *winner };
+        }
+    }
+}

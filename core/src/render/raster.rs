@@ -1,0 +1,121 @@
+//! A z-buffer rasteriser for pinhole cameras, in 2D homogeneous coordinates (Olano & Greer 1997): a triangle that
+//! crosses the camera plane needs no clipping, and triangles that share an edge cover every pixel of it once.
+//!
+//! First pass: the nearest triangle per pixel. Second pass: classes, from the exact intersection of ray and plane.
+
+use super::frame::{Frame, Span};
+use super::projection::Projection;
+use super::scene::Scene;
+use super::setup::{Setup, Shade, setup};
+use crate::camera::Pinhole;
+use crate::image::LabelImage;
+use resurvey_schema::Pose;
+
+/// Buffers and code to draw one image after the other without allocating anew; one per thread.
+#[derive(Clone, Debug, Default)]
+pub struct Renderer {
+    frame: Frame,
+    setups: Vec<Setup>,
+}
+
+impl Renderer {
+    /// A renderer without buffers; they grow with the first image.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Classes as `camera` sees them from `pose`, sky where nothing is; `labels` gets the camera's size.
+    ///
+    /// Surfaces nearer than 0.05 m along the optical axis are not drawn.
+    pub fn render_labels(&mut self, scene: &Scene, camera: &Pinhole, pose: &Pose, labels: &mut LabelImage) {
+        self.draw(scene, camera, pose);
+        self.shade(scene, labels);
+    }
+
+    /// The same, of the triangles with the given indices alone; indices outside the scene are left out.
+    pub fn render_labels_of(
+        &mut self,
+        (scene, triangles): (&Scene, &[u32]),
+        camera: &Pinhole,
+        pose: &Pose,
+        labels: &mut LabelImage,
+    ) {
+        let projection = Projection::new(scene, camera, pose);
+        self.start(camera);
+        for &triangle in triangles.iter().filter(|&&triangle| (triangle as usize) < scene.positions().len()) {
+            self.draw_triangle(scene, &projection, triangle);
+        }
+        self.shade(scene, labels);
+    }
+
+    /// Indices of the triangles that show in the image drawn last, rising.
+    pub fn visible_triangles(&self) -> Vec<u32> {
+        let mut seen = vec![false; self.setups.len()];
+        for v in 0..self.frame.height() {
+            self.frame.ids(v).iter().filter(|&&id| id > 0).for_each(|&id| seen[id as usize - 1] = true);
+        }
+        let mut visible: Vec<u32> =
+            self.setups.iter().zip(seen).filter(|(_, seen)| *seen).map(|(setup, _)| setup.triangle).collect();
+        visible.sort_unstable();
+        visible
+    }
+
+    /// First pass over the whole scene.
+    pub(super) fn draw(&mut self, scene: &Scene, camera: &Pinhole, pose: &Pose) {
+        let projection = Projection::new(scene, camera, pose);
+        self.start(camera);
+        for cluster in scene.clusters().iter().filter(|cluster| projection.may_see(cluster)) {
+            for triangle in cluster.triangles.clone() {
+                self.draw_triangle(scene, &projection, triangle as u32);
+            }
+        }
+    }
+
+    /// Setup of the nearest triangle per pixel of row `v`.
+    pub(super) fn row(&self, v: usize) -> impl Iterator<Item = Option<&Setup>> {
+        self.frame.ids(v).iter().map(|&id| (id as usize).checked_sub(1).and_then(|index| self.setups.get(index)))
+    }
+
+    fn start(&mut self, camera: &Pinhole) {
+        self.frame.clear(camera.width() as usize, camera.height() as usize);
+        self.setups.clear();
+    }
+
+    fn draw_triangle(&mut self, scene: &Scene, projection: &Projection, triangle: u32) {
+        let Some((setup, edges)) = setup(scene, projection, triangle) else { return };
+        self.setups.push(setup);
+        let id = self.setups.len() as u32;
+        let [step, per_row, constant] = setup.inverse_depth;
+        for v in edges.rows() {
+            let y = v as f64 + 0.5;
+            let (first, end) = edges.columns(y);
+            if first < end {
+                let start = (step * (first as f64 + 0.5) + (per_row * y + constant)) as f32;
+                self.frame.draw(Span { v, first, end, start, step: step as f32 }, id);
+            }
+        }
+    }
+
+    fn shade(&self, scene: &Scene, labels: &mut LabelImage) {
+        let (width, height) = (self.frame.width(), self.frame.height());
+        if (labels.width() as usize, labels.height() as usize) != (width, height) {
+            *labels = LabelImage::filled(width as u32, height as u32, scene.sky().0);
+        }
+        let rows = labels.values_mut().chunks_exact_mut(width.max(1));
+        for (v, row) in rows.enumerate() {
+            let ids = self.frame.ids(v);
+            let mut first = 0;
+            for run in ids.chunk_by(|a, b| a == b) {
+                let pixels = &mut row[first..first + run.len()];
+                match (run[0] as usize).checked_sub(1).and_then(|index| self.setups.get(index)) {
+                    None => pixels.fill(scene.sky().0),
+                    Some(setup) => match &setup.shade {
+                        Shade::Class(class) => pixels.fill(class.0),
+                        Shade::Texture(texture) => texture.classes(scene, setup, [first as f64, v as f64], pixels),
+                    },
+                }
+                first += run.len();
+            }
+        }
+    }
+}
