@@ -2,10 +2,7 @@
 //! queries.
 
 mod frame;
-<<<<<<< HEAD
 pub mod panorama;
-=======
->>>>>>> b737798 (Render a scene of classes and textures)
 mod plate;
 mod projection;
 mod raster;

@@ -4,7 +4,10 @@
 //! tangent, and the inverse of the horizontal distance is linear in the tangent: no projection, no clipping, exact at
 //! the cell centres.
 
+use super::Scene;
+use crate::mesh::Surface;
 use nalgebra::Vector3;
+use resurvey_schema::ClassId;
 
 /// Rows in a word of a bit plane.
 pub const ROWS_PER_WORD: usize = 64;
@@ -24,8 +27,9 @@ pub struct PanoramaGrid {
 pub struct PanoramaFrame {
     /// Inverse horizontal distance of the nearest surface, column by column, 1/m; 0 is sky.
     nearness: Vec<f32>,
-    /// Nearest triangle.
-    triangles: Vec<u32>,
+    /// Index of the nearest cone.
+    nearest: Vec<u32>,
+    cones: Vec<Cone>,
 }
 
 impl PanoramaGrid {
@@ -68,22 +72,53 @@ impl PanoramaGrid {
     /// Buffers of this size, all sky.
     pub fn frame(&self) -> PanoramaFrame {
         let cells = self.columns() * self.rows;
-        PanoramaFrame { nearness: vec![0.0; cells], triangles: vec![u32::MAX; cells] }
+        PanoramaFrame { nearness: vec![0.0; cells], nearest: vec![0; cells], cones: Vec::new() }
     }
 
-    /// Draws triangles given as corners relative to the eye (E, N, H, metres); the nearest wins, the first among equals.
-    pub fn draw(&self, frame: &mut PanoramaFrame, triangles: impl Iterator<Item = (u32, [Vector3<f64>; 3])>) {
-        frame.nearness.fill(0.0);
-        for (id, corners) in triangles {
-            if let Some(cone) = Cone::new(&corners) {
-                for column in cone.columns(&corners, self.columns()) {
-                    self.draw_column(frame, id, &cone, column);
-                }
+    /// Draws all triangles of `scene` as seen from `eye`, an offset from the scene's origin.
+    pub fn draw_scene(&self, frame: &mut PanoramaFrame, scene: &Scene, eye: [f64; 3]) {
+        let eye = Vector3::from(eye);
+        let from_eye = |corner: &[f32; 3]| Vector3::from(corner.map(f64::from)) - eye;
+        let triangles = scene.positions().iter().enumerate();
+        self.draw(frame, triangles.map(|(id, corners)| (id as u32, corners.each_ref().map(from_eye))));
+        for cone in &mut frame.cones {
+            if matches!(scene.surface(cone.triangle as usize), Surface::Texture(_)) {
+                cone.uv = Some(cone.uv_gradients(&scene.uvs()[cone.triangle as usize]));
             }
         }
     }
 
-    fn draw_column(&self, frame: &mut PanoramaFrame, id: u32, cone: &Cone, column: usize) {
+    /// Class in the cell at `column`, `row` of a frame that [`draw_scene`](Self::draw_scene) drew from `scene`.
+    pub fn class_at(&self, frame: &PanoramaFrame, scene: &Scene, column: usize, row: usize) -> ClassId {
+        let cell = column * self.rows + row;
+        let nearness = frame.nearness[cell];
+        if nearness <= 0.0 {
+            return scene.sky();
+        }
+        let cone = &frame.cones[frame.nearest[cell] as usize];
+        let uv = cone.uv.map_or([0.0; 2], |gradients| {
+            let direction = self.direction(column, row);
+            gradients.map(|gradient| (gradient.dot(&direction) / f64::from(nearness)) as f32)
+        });
+        scene.class_at(cone.triangle as usize, uv)
+    }
+
+    /// Draws triangles given as corners relative to the eye (E, N, H, metres); the nearest wins, the first among equals.
+    fn draw(&self, frame: &mut PanoramaFrame, triangles: impl Iterator<Item = (u32, [Vector3<f64>; 3])>) {
+        frame.nearness.fill(0.0);
+        frame.cones.clear();
+        for (id, corners) in triangles {
+            if let Some(cone) = Cone::new(id, &corners) {
+                let index = frame.cones.len() as u32;
+                for column in cone.columns(&corners, self.columns()) {
+                    self.draw_column(frame, index, &cone, column);
+                }
+                frame.cones.push(cone);
+            }
+        }
+    }
+
+    fn draw_column(&self, frame: &mut PanoramaFrame, index: u32, cone: &Cone, column: usize) {
         let [sin, cos] = self.columns[column];
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for edge in &cone.edges {
@@ -105,35 +140,31 @@ impl PanoramaGrid {
         let at_first = cone.nearness.x * sin + cone.nearness.y * cos + cone.nearness.z * self.tangent(first);
         let (at_first, step) = (at_first as f32, (cone.nearness.z * self.tangent_step) as f32);
         let cells = column * self.rows + first..column * self.rows + end;
-        let nearest = frame.nearness[cells.clone()].iter_mut().zip(&mut frame.triangles[cells]);
-        for (row, (nearness, triangle)) in nearest.enumerate() {
+        let nearest = frame.nearness[cells.clone()].iter_mut().zip(&mut frame.nearest[cells]);
+        for (row, (nearness, winner)) in nearest.enumerate() {
             let here = at_first + row as f32 * step;
             if here > *nearness {
                 *nearness = here;
-                *triangle = id;
+                *winner = index;
             }
         }
     }
 }
 
-impl PanoramaFrame {
-    /// The nearest triangle at a cell (index `column · rows + row`) and its horizontal distance, metres; `None` in sky.
-    pub fn hit(&self, cell: usize) -> Option<(u32, f64)> {
-        let nearness = self.nearness[cell];
-        (nearness > 0.0).then(|| (self.triangles[cell], 1.0 / f64::from(nearness)))
-    }
-}
-
 /// A triangle seen from the eye: directions w with `edge · w ≥ 0` for all three edges.
+#[derive(Clone, Debug)]
 struct Cone {
+    triangle: u32,
     edges: [Vector3<f64>; 3],
     /// `nearness · w` is one over the distance along w.
     nearness: Vector3<f64>,
+    /// `uv · w` over `nearness · w` is the texture coordinate along w; `None` without a texture.
+    uv: Option<[Vector3<f64>; 2]>,
 }
 
 impl Cone {
     /// `None` when the eye lies in the triangle's plane.
-    fn new(corners: &[Vector3<f64>; 3]) -> Option<Self> {
+    fn new(triangle: u32, corners: &[Vector3<f64>; 3]) -> Option<Self> {
         let [a, b, c] = corners;
         let edges = [b.cross(c), c.cross(a), a.cross(b)];
         let volume = a.dot(&edges[0]);
@@ -143,7 +174,17 @@ impl Cone {
             return None;
         }
         let sign = volume.signum();
-        Some(Self { edges: edges.map(|edge| edge * sign), nearness: normal / volume })
+        Some(Self { triangle, edges: edges.map(|edge| edge * sign), nearness: normal / volume, uv: None })
+    }
+
+    /// The edges are barycentric weights up to the one factor that makes their sum the nearness.
+    fn uv_gradients(&self, uvs: &[[f32; 2]; 3]) -> [Vector3<f64>; 2] {
+        let sum = self.edges[0] + self.edges[1] + self.edges[2];
+        let scale = self.nearness.dot(&sum) / sum.norm_squared();
+        [0, 1].map(|axis| {
+            let weighted = self.edges.iter().zip(uvs).map(|(edge, uv)| edge * f64::from(uv[axis]));
+            weighted.sum::<Vector3<f64>>() * scale
+        })
     }
 
     /// The columns whose azimuth the cone can contain.
@@ -205,7 +246,9 @@ mod tests {
                     let expected = scene.iter().enumerate()
                         .filter_map(|(id, corners)| ray_distance(direction, *corners).map(|t| (id as u32, t)))
                         .min_by(|a, b| a.1.total_cmp(&b.1));
-                    let found = frame.hit(column * grid.rows() + row);
+                    let cell = column * grid.rows() + row;
+                    let found = (frame.nearness[cell] > 0.0)
+                        .then(|| (frame.cones[frame.nearest[cell] as usize].triangle, 1.0 / f64::from(frame.nearness[cell])));
                     let same = match (expected, found) {
                         (None, None) => true,
                         (Some((_, a)), Some((_, b))) => (a - b).abs() < 1e-3 * a,

@@ -1,0 +1,375 @@
+//! The command line: names, options, units, defaults and help.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Keeps a 3D city map current from phone photos.
+///
+/// A map is one file (*.rsv). Results go to standard output, progress and messages to standard error.
+#[derive(Debug, Parser)]
+#[command(name = "resurvey", version, arg_required_else_help = true, subcommand_required = true)]
+pub struct Cli {
+    /// Print one JSON document instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Directory with plugin libraries, searched before the built-in plugins; may be given again
+    #[arg(long, global = true, value_name = "DIR")]
+    pub plugin_dir: Vec<PathBuf>,
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Make an empty map file (version 0); refuses to overwrite one
+    Init(Init),
+    /// Add the objects of models to the map as one new version
+    Import(Import),
+    /// Find where a photo was taken; changes nothing on disk but the files you name
+    Localize(Localize),
+    /// Draw the map as a camera sees it: class image, depth and points; writes into --out only
+    Render(Render),
+    /// Localize, detect, estimate and commit: one new version per capture that changes something
+    Update(Update),
+    /// List descriptors and objects in a region at a version; changes nothing
+    Query(Query),
+    /// List versions that changed something, newest first; changes nothing
+    Log(Log),
+    /// Show the evidence behind a descriptor or object; changes nothing
+    Why(Why),
+    /// Apply a change set (JSON lines) as one new version, or refuse it whole
+    Apply(Apply),
+    /// Write a version or region of the map to another format; changes nothing in the map
+    Export(Export),
+    /// List and describe plugins; runs no plugin code
+    #[command(subcommand)]
+    Plugins(Plugins),
+    /// Check everything that must hold in a map; changes nothing
+    Fsck(Fsck),
+    /// Print the completion script of a shell
+    Completions(Completions),
+    /// Write a manual page per command into a directory
+    Man(Man),
+}
+
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+pub struct Init {
+    /// Map file to make
+    pub map: PathBuf,
+    /// Coordinate reference system of the map; others than EPSG:2326 need a build with --features proj
+    #[arg(long, default_value = "EPSG:2326")]
+    pub crs: String,
+    /// Class table, JSON: [{"index":0,"name":"stone","colour":[0,0,255],"kind":"material"}, …]; default: the nine classes
+    #[arg(long, value_name = "FILE")]
+    pub classes: Option<PathBuf>,
+}
+
+/// Arguments of `import`.
+#[derive(Debug, Args)]
+pub struct Import {
+    /// Map file
+    pub map: PathBuf,
+    /// Models: 3DS, GLB or glTF, told apart by content
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Grid position of the model's origin, metres, e.g. 835600,817800,4.5
+    #[arg(long, value_name = "E,N,H", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    pub origin: Option<[f64; 3]>,
+    /// CRS of the model's own coordinates, e.g. EPSG:2056; needs a build with --features proj
+    #[arg(long, value_name = "EPSG:CODE", conflicts_with = "origin")]
+    pub crs: Option<String>,
+    /// The model's up axis; default: what the format says
+    #[arg(long, value_enum)]
+    pub up: Option<UpAxis>,
+    /// Turn the model clockwise about the up axis before it is moved to the origin, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub rotate: f64,
+    /// Classes of materials, TOML: name = "class", default = "class"
+    #[arg(long, value_name = "FILE")]
+    pub map_classes: Option<PathBuf>,
+    /// Take the nearest class colour within this distance (0–441) in label textures, for lossy ones such as JPG
+    #[arg(long, value_name = "DISTANCE")]
+    pub nearest_colour: Option<f64>,
+    /// Index that means "unlabelled" in label textures
+    #[arg(long, value_name = "INDEX")]
+    pub void_index: Option<u8>,
+    /// Message of the version
+    #[arg(long, value_name = "TEXT")]
+    pub message: Option<String>,
+    /// Who commits
+    #[arg(long, value_name = "NAME", default_value = "resurvey")]
+    pub author: String,
+}
+
+/// Up axis of a model.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum UpAxis {
+    /// y up, as glTF has it
+    Y,
+    /// z up, as 3DS has it
+    Z,
+}
+
+/// Choice and settings of plugins.
+#[derive(Debug, Args)]
+pub struct Settings {
+    /// A setting of a plugin or of the gate; "resurvey plugins info NAME" lists them. May be given again
+    #[arg(long, value_name = "PLUGIN.KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Behaviour of all plugins that know profiles: default, or paper as published
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
+}
+
+/// Arguments of `localize`.
+#[derive(Debug, Args)]
+pub struct Localize {
+    /// Map file
+    pub map: PathBuf,
+    /// capture.json
+    pub capture: PathBuf,
+    /// VPS matcher; "resurvey plugins list" lists them
+    #[arg(long, default_value = "semantic")]
+    pub matcher: String,
+    #[command(flatten)]
+    pub settings: Settings,
+    /// Version, tag, date (@2026-03-01) or head
+    #[arg(long, default_value = "head", value_name = "REV")]
+    pub at: String,
+    /// Write the score of every candidate position as a picture
+    #[arg(long, value_name = "FILE.png")]
+    pub heatmap: Option<PathBuf>,
+    /// Mark the true pose in the heat map: a JSON file with a "pose"
+    #[arg(long, value_name = "FILE.json", requires = "heatmap")]
+    pub truth: Option<PathBuf>,
+    /// Write the result, which update and render read with --pose
+    #[arg(long, value_name = "POSE.json")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct Render {
+    /// Map file
+    pub map: PathBuf,
+    /// capture.json: its camera, and its prior pose unless --pose is given
+    #[arg(required_unless_present = "pose")]
+    pub capture: Option<PathBuf>,
+    /// Pose to draw from: a JSON file with a "pose"; without a capture the camera is 960x720 with a 120° diagonal
+    #[arg(long, value_name = "POSE.json")]
+    pub pose: Option<PathBuf>,
+    /// Version, tag, date or head
+    #[arg(long, default_value = "head", value_name = "REV")]
+    pub at: String,
+    /// Directory for class.png, depth.png, points.ply and view.json
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `update`.
+#[derive(Debug, Args)]
+pub struct Update {
+    /// Map file
+    pub map: PathBuf,
+    /// One or more capture.json
+    #[arg(required = true)]
+    pub captures: Vec<PathBuf>,
+    /// Take this pose instead of localizing: a JSON file with a "pose"
+    #[arg(long, value_name = "POSE.json")]
+    pub pose: Option<PathBuf>,
+    /// VPS matcher
+    #[arg(long, default_value = "semantic")]
+    pub matcher: String,
+    /// Change detector
+    #[arg(long, default_value = "class-difference")]
+    pub detector: String,
+    /// Descriptor estimator
+    #[arg(long, default_value = "descriptors")]
+    pub estimator: String,
+    #[command(flatten)]
+    pub settings: Settings,
+    /// Do everything but write: the map stays as it is
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Keep the label image in the map as evidence
+    #[arg(long)]
+    pub keep_labels: bool,
+    /// Message of the version
+    #[arg(long, value_name = "TEXT")]
+    pub message: Option<String>,
+    /// Who commits
+    #[arg(long, value_name = "NAME", default_value = "resurvey")]
+    pub author: String,
+}
+
+/// A region of the map.
+#[derive(Debug, Args)]
+pub struct Region {
+    /// West, south, east, north: grid metres, or degrees with --wgs84
+    #[arg(long, value_name = "E0,N0,E1,N1", allow_hyphen_values = true, value_parser = numbers::<4>)]
+    pub bbox: Option<[f64; 4]>,
+    /// Lowest and highest height, metres above the map's datum
+    #[arg(long, value_name = "H0,H1", allow_hyphen_values = true, value_parser = numbers::<2>)]
+    pub height: Option<[f64; 2]>,
+}
+
+/// Arguments of `query`.
+#[derive(Debug, Args)]
+pub struct Query {
+    /// Map file
+    pub map: PathBuf,
+    #[command(flatten)]
+    pub region: Region,
+    /// A GeoJSON file with a polygon, grid metres, or degrees with --wgs84
+    #[arg(long, value_name = "FILE.geojson", conflicts_with = "bbox")]
+    pub polygon: Option<PathBuf>,
+    /// Centre of a circle, degrees
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, value_parser = numbers::<2>, requires = "radius", conflicts_with_all = ["bbox", "polygon"])]
+    pub near: Option<[f64; 2]>,
+    /// Radius of the circle, metres
+    #[arg(long, value_name = "M", requires = "near")]
+    pub radius: Option<f64>,
+    /// Version, tag, date or head
+    #[arg(long, default_value = "head", value_name = "REV")]
+    pub at: String,
+    /// Only this class; may be given again
+    #[arg(long, value_name = "NAME")]
+    pub class: Vec<String>,
+    /// Coordinates in and out are WGS84 degrees
+    #[arg(long)]
+    pub wgs84: bool,
+    /// Form of the answer
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: QueryFormat,
+}
+
+/// Form of a query's answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum QueryFormat {
+    /// For people
+    Table,
+    /// One JSON document
+    Json,
+    /// A GeoJSON feature collection (WGS84, as RFC 7946 asks)
+    Geojson,
+    /// Comma-separated, one feature a line
+    Csv,
+}
+
+/// Arguments of `log`.
+#[derive(Debug, Args)]
+pub struct Log {
+    /// Map file
+    pub map: PathBuf,
+    /// Only versions that changed this feature
+    pub fid: Option<u64>,
+    #[command(flatten)]
+    pub region: Region,
+    /// At most this many versions
+    #[arg(long, short = 'n', value_name = "N")]
+    pub limit: Option<usize>,
+}
+
+/// Arguments of `why`.
+#[derive(Debug, Args)]
+pub struct Why {
+    /// Map file
+    pub map: PathBuf,
+    /// Feature id, as query prints it
+    pub fid: u64,
+}
+
+/// Arguments of `apply`.
+#[derive(Debug, Args)]
+pub struct Apply {
+    /// Map file
+    pub map: PathBuf,
+    /// Change set (resurvey.changes/1); - reads standard input
+    pub file: PathBuf,
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct Export {
+    /// Map file
+    pub map: PathBuf,
+    /// File to write; its suffix says the format: .glb
+    pub out: PathBuf,
+    /// Version, tag, date or head
+    #[arg(long, default_value = "head", value_name = "REV")]
+    pub at: String,
+    #[command(flatten)]
+    pub region: Region,
+}
+
+/// `plugins` subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Plugins {
+    /// List plugins by kind
+    List {
+        /// Also say which directories were searched and why a file was skipped
+        #[arg(long, short)]
+        verbose: bool,
+    },
+    /// Describe a plugin and its settings
+    Info {
+        /// Name, as list prints it
+        name: String,
+    },
+}
+
+/// Arguments of `fsck`.
+#[derive(Debug, Args)]
+pub struct Fsck {
+    /// Map file
+    pub map: PathBuf,
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// Shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Directory, made when it is missing
+    pub out: PathBuf,
+}
+
+/// Parses exactly `N` finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let values: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().map_err(|_| format!("expected {N} numbers with commas, found {part:?}")))
+        .collect::<Result<_, _>>()?;
+    if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+        return Err(format!("expected finite numbers, found {value}"));
+    }
+    let found = values.len();
+    values.try_into().map_err(|_| format!("expected {N} numbers with commas, found {found}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_and_missing_numbers_are_told_apart() {
+        assert_eq!(numbers::<2>("-1.5, 2").unwrap(), [-1.5, 2.0]);
+        assert!(numbers::<2>("1").unwrap_err().contains("found 1"));
+        assert!(numbers::<2>("1,NaN").unwrap_err().contains("finite"));
+    }
+}

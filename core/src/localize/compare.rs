@@ -1,0 +1,111 @@
+//! Comparing many views and panoramas with one photo, at the renderer's speed: what the services of the same names do.
+
+use super::sweep::{ClassPlanes, PanoramaPhoto};
+use crate::camera::{Camera, camera_from_world};
+use crate::image::LabelImage;
+use crate::metrics::{BoundaryPhoto, overlap_counts};
+use crate::render::panorama::PanoramaGrid;
+use crate::render::{Renderer, Scene, view};
+use rayon::prelude::*;
+use resurvey_schema::service::{ClassCounts, CompareRequest, PanoramaRequest};
+use resurvey_schema::{GridPoint, Pose};
+
+/// Tangents of elevation between which a panorama lies: from −39° to 63°, what a phone held upright in a street sees.
+const TANGENTS: [f64; 2] = [-0.8, 2.0];
+/// 128 rows: 1.25° at the horizon.
+const WORDS: usize = 2;
+
+/// The photo at one stride, ready to be compared with views.
+pub struct ViewPhoto {
+    camera: Camera,
+    labels: LabelImage,
+    boundaries: Option<BoundaryPhoto>,
+    request: CompareRequest,
+    classes: usize,
+}
+
+impl ViewPhoto {
+    /// The photo as `request` wants it compared.
+    pub fn new(photo: &LabelImage, camera: &Camera, classes: usize, request: &CompareRequest) -> Self {
+        let labels = every(photo, request.stride);
+        let tolerance_px = request.boundary_tolerance_px / f64::from(request.stride);
+        let boundaries = (request.boundary_tolerance_px > 0.0).then(|| {
+            BoundaryPhoto::new(&labels, classes, tolerance_px, &request.ignored_in_photo, &request.ignored_in_view)
+        });
+        Self { camera: camera.subsampled(request.stride), labels, boundaries, request: *request, classes }
+    }
+
+    /// Fills `counts[pose][class]`.
+    pub fn compare(&self, scene: &Scene, poses: &[Pose], counts: &mut [ClassCounts]) {
+        let blank = || (Renderer::new(), LabelImage::filled(self.labels.width(), self.labels.height(), 0));
+        let per_pose = poses.par_iter().zip(counts.par_chunks_mut(self.classes.max(1)));
+        per_pose.for_each_init(blank, |(renderer, seen), (pose, counts)| {
+            match self.camera.pinhole() {
+                Some(pinhole) => renderer.render_labels(scene, &pinhole, pose, seen),
+                None => *seen = view(scene, &self.camera, pose).labels,
+            }
+            let CompareRequest { ignored_in_photo, ignored_in_view, .. } = &self.request;
+            let overlaps = overlap_counts(&self.labels, seen, self.classes, ignored_in_photo, ignored_in_view);
+            counts.copy_from_slice(&overlaps);
+            if let Some(boundaries) = &self.boundaries {
+                boundaries.add_counts(seen, counts);
+            }
+        });
+    }
+}
+
+/// Every `stride`-th pixel along both axes, starting half a stride in.
+pub fn every(image: &LabelImage, stride: u32) -> LabelImage {
+    let picked = |length: u32| (stride / 2..length).step_by(stride as usize);
+    let values: Vec<u8> =
+        picked(image.height()).flat_map(|v| picked(image.width()).map(move |u| image.at(u, v))).collect();
+    let (width, height) = (picked(image.width()).count() as u32, picked(image.height()).count() as u32);
+    LabelImage::from_values(width, height, values).expect("one value per picked column and row")
+}
+
+/// The photo on a panorama grid, ready to be compared with positions.
+pub struct PositionPhoto {
+    grid: PanoramaGrid,
+    photo: PanoramaPhoto,
+    request: PanoramaRequest,
+    classes: usize,
+}
+
+impl PositionPhoto {
+    /// The photo as `request` wants it compared.
+    pub fn new(photo: &LabelImage, camera: &Camera, classes: usize, request: &PanoramaRequest) -> Self {
+        let grid = PanoramaGrid::new(request.columns, WORDS, TANGENTS[0], TANGENTS[1]);
+        let north = Pose {
+            position: GridPoint::new(0.0, 0.0, 0.0),
+            yaw_rad: 0.0,
+            pitch_rad: request.pitch_rad,
+            roll_rad: request.roll_rad,
+        };
+        let camera_from_map = camera_from_world(&north);
+        let class_at = |column: usize, row: usize| {
+            let [u, v] = camera.project(camera_from_map * grid.direction(column, row))?;
+            let inside = u >= 0.0 && v >= 0.0 && u < f64::from(photo.width()) && v < f64::from(photo.height());
+            inside.then(|| photo.at(u as u32, v as u32))
+        };
+        let photo = PanoramaPhoto::new(&grid, classes, &request.ignored_in_photo, class_at);
+        Self { grid, photo, request: *request, classes }
+    }
+
+    /// Fills `counts[position][heading][class]`.
+    pub fn compare(&self, scene: &Scene, positions: &[GridPoint], counts: &mut [ClassCounts]) {
+        let headings = self.request.yaw_count as usize;
+        let column_rad = std::f64::consts::TAU / f64::from(self.request.columns);
+        let first = (self.request.first_yaw_rad / column_rad).round() as i64;
+        let blank = || (self.grid.frame(), ClassPlanes::new(&self.grid, self.classes));
+        let per_position = positions.par_iter().zip(counts.par_chunks_mut((headings * self.classes).max(1)));
+        per_position.for_each_init(blank, |(frame, planes), (position, counts)| {
+            self.grid.draw_scene(frame, scene, scene.offset(*position));
+            let class_at = |column, row| Some(self.grid.class_at(frame, scene, column, row).0);
+            planes.fill(&self.grid, &self.request.ignored_in_view, class_at);
+            for (heading, counts) in counts.chunks_mut(self.classes).enumerate() {
+                let column = first + heading as i64 * i64::from(self.request.yaw_step_columns);
+                self.photo.counts(planes, column, counts);
+            }
+        });
+    }
+}

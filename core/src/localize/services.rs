@@ -1,0 +1,253 @@
+//! The services of the host on a world and a capture.
+
+use super::World;
+use super::compare::{PositionPhoto, ViewPhoto};
+use crate::camera::{Camera, camera_from_world, world_from_camera};
+use crate::capture::Capture;
+use crate::crs::Crs;
+use crate::plugin::{ServiceError, Services, ViewImages, class_slots};
+use crate::render::view;
+use nalgebra::Vector3;
+use resurvey_schema::service::{ClassCounts, CompareRequest, Level, PanoramaRequest, RayHit};
+use resurvey_schema::{ClassTable, Descriptor, GridPoint, Pose, Wgs84};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Where a run's messages go and whether it should end; the command line fills it in.
+pub trait Listener: Sync {
+    /// Takes a line for the log.
+    fn log(&self, level: Level, text: &str);
+    /// Takes how far the present stage is, 0–1.
+    fn progress(&self, fraction: f64);
+    /// Whether the run is to end.
+    fn cancelled(&self) -> bool;
+}
+
+/// Hears nothing and never cancels.
+pub struct Silent;
+
+impl Listener for Silent {
+    fn log(&self, _level: Level, _text: &str) {}
+    fn progress(&self, _fraction: f64) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// The services that plugins call while they work on `capture` in `world`.
+pub struct SceneServices<'a> {
+    world: &'a World,
+    capture: &'a Capture,
+    crs: Crs,
+    listener: &'a dyn Listener,
+    view_photos: Mutex<Vec<(CompareRequest, Arc<ViewPhoto>)>>,
+    position_photos: Mutex<Vec<(PanoramaRequest, Arc<PositionPhoto>)>>,
+}
+
+impl<'a> SceneServices<'a> {
+    /// Services on `world`, whose grid is `crs`, for `capture`.
+    pub fn new(world: &'a World, capture: &'a Capture, crs: Crs, listener: &'a dyn Listener) -> Self {
+        let (view_photos, position_photos) = (Mutex::default(), Mutex::default());
+        Self { world, capture, crs, listener, view_photos, position_photos }
+    }
+
+    fn classes_count(&self) -> usize {
+        class_slots(self.world.classes())
+    }
+}
+
+/// The photo prepared for `request`, made once and kept.
+fn prepared<R: Copy + PartialEq, P>(
+    kept: &Mutex<Vec<(R, Arc<P>)>>,
+    request: &R,
+    prepare: impl FnOnce() -> P,
+) -> Arc<P> {
+    let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, photo)) = kept.iter().find(|(known, _)| known == request) {
+        return Arc::clone(photo);
+    }
+    let photo = Arc::new(prepare());
+    kept.push((*request, Arc::clone(&photo)));
+    photo
+}
+
+fn finite(what: &str, values: impl IntoIterator<Item = f64>) -> Result<(), ServiceError> {
+    match values.into_iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(ServiceError(format!("{what}: expected finite numbers, found {value}"))),
+        None => Ok(()),
+    }
+}
+
+fn finite_poses(poses: &[Pose]) -> Result<(), ServiceError> {
+    let numbers = |pose: &Pose| {
+        let [east, north, height]: [f64; 3] = pose.position.into();
+        [east, north, height, pose.yaw_rad, pose.pitch_rad, pose.roll_rad]
+    };
+    finite("pose", poses.iter().flat_map(numbers))
+}
+
+fn finite_points(points: &[GridPoint]) -> Result<(), ServiceError> {
+    finite("position", points.iter().flat_map(|point| <[f64; 3]>::from(*point)))
+}
+
+fn checked_stride(stride: u32, camera: &Camera) -> Result<(), ServiceError> {
+    let longest = camera.width().min(camera.height());
+    if (1..=longest).contains(&stride) {
+        return Ok(());
+    }
+    Err(ServiceError(format!("stride is {stride}; expected 1 to {longest}")))
+}
+
+impl Services for SceneServices<'_> {
+    fn classes(&self) -> &ClassTable {
+        self.world.classes()
+    }
+
+    fn render(
+        &self,
+        stride: u32,
+        with_descriptors: bool,
+        poses: &[Pose],
+        receive: &mut dyn FnMut(&ViewImages<'_>),
+    ) -> Result<(), ServiceError> {
+        checked_stride(stride, &self.capture.camera)?;
+        finite_poses(poses)?;
+        let camera = self.capture.camera.subsampled(stride);
+        let scene = self.world.scene(with_descriptors);
+        for pose in poses {
+            let view = view(scene, &camera, pose);
+            receive(&ViewImages {
+                origin: view.origin,
+                labels: &view.labels,
+                range_m: &view.range_m,
+                points: &view.points,
+                features: &view.features,
+                feature_table: scene.feature_table(),
+            });
+        }
+        Ok(())
+    }
+
+    fn compare_views(
+        &self,
+        request: &CompareRequest,
+        poses: &[Pose],
+        counts: &mut [ClassCounts],
+    ) -> Result<(), ServiceError> {
+        checked_stride(request.stride, &self.capture.camera)?;
+        finite("boundary tolerance", [request.boundary_tolerance_px])?;
+        finite_poses(poses)?;
+        let photo = prepared(&self.view_photos, request, || {
+            ViewPhoto::new(&self.capture.labels, &self.capture.camera, self.classes_count(), request)
+        });
+        photo.compare(self.world.scene(true), poses, counts);
+        Ok(())
+    }
+
+    fn compare_panoramas(
+        &self,
+        request: &PanoramaRequest,
+        positions: &[GridPoint],
+        counts: &mut [ClassCounts],
+    ) -> Result<(), ServiceError> {
+        finite("panorama", [request.pitch_rad, request.roll_rad, request.first_yaw_rad])?;
+        finite_points(positions)?;
+        if !(4..=7200).contains(&request.columns) {
+            return Err(ServiceError(format!("columns is {}; expected 4 to 7200", request.columns)));
+        }
+        let photo = prepared(&self.position_photos, request, || {
+            PositionPhoto::new(&self.capture.labels, &self.capture.camera, self.classes_count(), request)
+        });
+        photo.compare(self.world.scene(true), positions, counts);
+        Ok(())
+    }
+
+    fn inside_solid(&self, positions: &[GridPoint]) -> Result<Vec<bool>, ServiceError> {
+        finite_points(positions)?;
+        Ok(self.world.solids().contain(positions))
+    }
+
+    fn pixel_rays(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Result<Vec<[f64; 3]>, ServiceError> {
+        finite_poses(&[*pose])?;
+        finite("pixel", pixels.iter().flatten().copied())?;
+        let map_from_camera = world_from_camera(pose);
+        let ray = |[u, v]: &[f64; 2]| {
+            let ray = self.capture.camera.ray(*u, *v);
+            ray.map(|ray| (map_from_camera * ray).into())
+                .ok_or_else(|| ServiceError(format!("pixel {u:.1}, {v:.1} has no ray in this camera model")))
+        };
+        pixels.iter().map(ray).collect()
+    }
+
+    fn project(&self, pose: &Pose, points: &[GridPoint]) -> Result<Vec<Option<[f64; 2]>>, ServiceError> {
+        finite_poses(&[*pose])?;
+        finite_points(points)?;
+        let camera_from_map = camera_from_world(pose);
+        let eye = pose.position;
+        let pixel = |point: &GridPoint| {
+            let offset = Vector3::new(
+                point.easting_m - eye.easting_m,
+                point.northing_m - eye.northing_m,
+                point.height_m - eye.height_m,
+            );
+            self.capture.camera.project(camera_from_map * offset)
+        };
+        Ok(points.iter().map(pixel).collect())
+    }
+
+    fn cast_rays(
+        &self,
+        origin: GridPoint,
+        directions: &[[f64; 3]],
+        limit_m: f64,
+        with_descriptors: bool,
+    ) -> Result<Vec<Option<RayHit>>, ServiceError> {
+        finite_points(&[origin])?;
+        finite("direction", directions.iter().flatten().copied())?;
+        let scene = self.world.scene(with_descriptors);
+        let rays = self.world.rays(with_descriptors);
+        let fid = |feature: u32| {
+            let index = (feature as usize).checked_sub(1)?;
+            scene.feature_table().get(index).map(|feature| feature.fid)
+        };
+        let hit = |direction: &[f64; 3]| {
+            let hit = rays.cast(origin, *direction, limit_m)?;
+            let fid = fid(hit.feature);
+            Some(RayHit { point: hit.point, range_m: hit.range_m, normal: hit.normal, class: hit.class, fid })
+        };
+        Ok(directions.iter().map(hit).collect())
+    }
+
+    fn descriptors_near(&self, point: GridPoint, radius_m: f64) -> Result<Vec<(u64, Descriptor)>, ServiceError> {
+        finite_points(&[point])?;
+        let near = |anchor: GridPoint| {
+            anchor.plan_distance_m(&point).hypot(anchor.height_m - point.height_m) <= radius_m
+        };
+        let found = self.world.descriptors().iter().filter(|(_, descriptor)| near(descriptor.anchor()));
+        Ok(found.cloned().collect())
+    }
+
+    fn ground_height(&self, point: GridPoint) -> Result<Option<f64>, ServiceError> {
+        finite_points(&[point])?;
+        Ok(self.world.rays(false).ground_below(point).map(|hit| hit.point.height_m))
+    }
+
+    fn grid_from_wgs84(&self, position: Wgs84) -> Result<GridPoint, ServiceError> {
+        self.crs.grid_from_wgs84(position).map_err(|error| ServiceError(error.to_string()))
+    }
+
+    fn wgs84_from_grid(&self, point: GridPoint) -> Result<Wgs84, ServiceError> {
+        self.crs.wgs84_from_grid(point).map_err(|error| ServiceError(error.to_string()))
+    }
+
+    fn log(&self, level: Level, text: &str) {
+        self.listener.log(level, text);
+    }
+
+    fn progress(&self, fraction: f64) {
+        self.listener.progress(fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.listener.cancelled()
+    }
+}

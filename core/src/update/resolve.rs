@@ -1,0 +1,283 @@
+//! From proposals to changes: what is on the map already, what it replaces, which descriptor a removal means.
+
+use super::overlap::Overlap;
+use resurvey_schema::{
+    ChangeRegion, ClassId, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Proposal, Rejection,
+};
+
+/// Reach of a removal, metres, where three times its 1σ is less: Lee & Hsu's Algorithm 2 has none and would take a
+/// chair 100 m away.
+const REMOVAL_REACH_M: f64 = 3.0;
+/// Two rectangles of which this share of both together coincides are one.
+const SAME_OVER_UNION: f64 = 0.5;
+/// A rectangle that covers this share of a smaller one replaces it.
+const COVERS_OVER_SMALLER: f64 = 0.6;
+/// Corners that moved less than this did not move, metres: the edge of a label is no sharper.
+const SAME_CORNER_M: f64 = 0.5;
+/// The same in shares of the rectangle's diagonal, for large ones.
+const SAME_CORNER_SHARE: f64 = 0.1;
+/// Share of the smaller footprint side within which two objects of one class are the same.
+const SAME_OBJECT_SHARE: f64 = 1.0;
+
+/// One change of the map.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// A new descriptor.
+    Add(Descriptor),
+    /// Another state of the descriptor with this feature id.
+    Modify {
+        /// Feature id.
+        fid: u64,
+        /// Its state in the map.
+        before: Descriptor,
+        /// Its new state.
+        after: Descriptor,
+    },
+    /// The descriptor with this feature id goes.
+    Remove {
+        /// Feature id.
+        fid: u64,
+        /// Its state in the map.
+        before: Descriptor,
+    },
+}
+
+/// Changes, and what was not changed with the reason.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Resolution {
+    /// What changes.
+    pub changes: Vec<Change>,
+    /// What does not.
+    pub rejections: Vec<Rejection>,
+}
+
+/// Makes changes of `proposals` about `regions` on a map with `descriptors`. Each descriptor of the map is changed at
+/// most once.
+pub fn resolve(
+    proposals: Vec<Proposal>,
+    regions: &[ChangeRegion],
+    descriptors: &[(u64, Descriptor)],
+) -> Resolution {
+    let mut resolver = Resolver { regions, descriptors, taken: Vec::new(), resolution: Resolution::default() };
+    let mut removals = Vec::new();
+    for proposal in proposals {
+        match proposal {
+            Proposal::Place { region, descriptor } => resolver.place(region, descriptor),
+            Proposal::Remove { region, class, near, sigma_m } => removals.push(Removal { region, class, near, sigma_m }),
+            Proposal::Reject { rejection, .. } => resolver.resolution.rejections.push(rejection),
+        }
+    }
+    resolver.remove(removals);
+    resolver.resolution
+}
+
+struct Removal {
+    region: u32,
+    class: ClassId,
+    near: GridPoint,
+    sigma_m: f64,
+}
+
+struct Resolver<'a> {
+    regions: &'a [ChangeRegion],
+    descriptors: &'a [(u64, Descriptor)],
+    /// Feature ids that a change speaks of already.
+    taken: Vec<u64>,
+    resolution: Resolution,
+}
+
+/// What a measured descriptor is to one on the map.
+enum Relation {
+    Unrelated,
+    Same { moved_m: f64, limit_m: f64 },
+    Replaces,
+}
+
+impl Resolver<'_> {
+    fn place(&mut self, region: u32, descriptor: Descriptor) {
+        for (fid, present) in self.descriptors {
+            if self.taken.contains(fid) {
+                continue;
+            }
+            match relation(present, &descriptor) {
+                Relation::Unrelated => {}
+                Relation::Same { moved_m, limit_m } => {
+                    return self.reject(region, "already-on-map", moved_m, limit_m, "m");
+                }
+                Relation::Replaces => {
+                    self.taken.push(*fid);
+                    let change = Change::Modify { fid: *fid, before: present.clone(), after: descriptor };
+                    return self.resolution.changes.push(change);
+                }
+            }
+        }
+        self.resolution.changes.push(Change::Add(descriptor));
+    }
+
+    /// Nearest pairs first, one removal to one descriptor.
+    fn remove(&mut self, removals: Vec<Removal>) {
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (index, removal) in removals.iter().enumerate() {
+            let reach_m = reach_m(removal);
+            for (position, (fid, present)) in self.descriptors.iter().enumerate() {
+                let distance_m = distance_m(removal.near, present.anchor());
+                if present.class() == removal.class && distance_m <= reach_m && !self.taken.contains(fid) {
+                    pairs.push((distance_m, index, position));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let mut served = vec![false; removals.len()];
+        for (_, index, position) in pairs {
+            let (fid, present) = &self.descriptors[position];
+            if !served[index] && !self.taken.contains(fid) {
+                served[index] = true;
+                self.taken.push(*fid);
+                self.resolution.changes.push(Change::Remove { fid: *fid, before: present.clone() });
+            }
+        }
+        for (removal, _) in removals.iter().zip(&served).filter(|(_, served)| !**served) {
+            let of_class = self.descriptors.iter().filter(|(_, present)| present.class() == removal.class);
+            let nearest_m = of_class.map(|(_, present)| distance_m(removal.near, present.anchor())).min_by(f64::total_cmp);
+            // A map without any such descriptor has none in any reach; the reach itself is the one honest number then.
+            self.reject(removal.region, "nothing-to-remove", nearest_m.unwrap_or(reach_m(removal)), reach_m(removal), "m");
+        }
+    }
+
+    fn reject(&mut self, region: u32, requirement: &str, measured: f64, limit: f64, unit: &str) {
+        let Some(region) = self.regions.get(region as usize) else { return };
+        self.resolution.rejections.push(Rejection {
+            class_before: region.class_before,
+            class_after: region.class_after,
+            pixels: region.pixels,
+            requirement: requirement.to_owned(),
+            measured,
+            limit,
+            unit: unit.to_owned(),
+        });
+    }
+}
+
+fn reach_m(removal: &Removal) -> f64 {
+    REMOVAL_REACH_M.max(3.0 * removal.sigma_m)
+}
+
+fn distance_m(a: GridPoint, b: GridPoint) -> f64 {
+    a.plan_distance_m(&b).hypot(a.height_m - b.height_m)
+}
+
+fn relation(present: &Descriptor, measured: &Descriptor) -> Relation {
+    match (present, measured) {
+        (Descriptor::Material(present), Descriptor::Material(measured)) => material_relation(present, measured),
+        (Descriptor::Dynamic(present), Descriptor::Dynamic(measured)) => dynamic_relation(present, measured),
+        _ => Relation::Unrelated,
+    }
+}
+
+fn material_relation(present: &MaterialDescriptor, measured: &MaterialDescriptor) -> Relation {
+    let Some(overlap) = Overlap::of(present, measured) else { return Relation::Unrelated };
+    if overlap.over_union() < SAME_OVER_UNION && overlap.over_smaller() < COVERS_OVER_SMALLER {
+        return Relation::Unrelated;
+    }
+    let corners = || present.corners.iter().zip(&measured.corners);
+    let moved_m = corners().map(|(a, b)| distance_m(*a, *b)).fold(0.0, f64::max);
+    let diagonal_m = distance_m(present.corners[0], present.corners[2]);
+    let limit_m = SAME_CORNER_M.max(SAME_CORNER_SHARE * diagonal_m);
+    if present.class == measured.class && moved_m <= limit_m {
+        return Relation::Same { moved_m, limit_m };
+    }
+    Relation::Replaces
+}
+
+fn dynamic_relation(present: &DynamicDescriptor, measured: &DynamicDescriptor) -> Relation {
+    let moved_m = distance_m(present.position, measured.position);
+    let limit_m = SAME_OBJECT_SHARE * present.size_m[0].min(present.size_m[1]);
+    if present.class == measured.class && moved_m <= limit_m {
+        return Relation::Same { moved_m, limit_m };
+    }
+    Relation::Unrelated
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::overlap::tests::banner;
+    use super::*;
+    use resurvey_schema::PixelBox;
+
+    fn region() -> ChangeRegion {
+        let bounds = PixelBox { left: 0, top: 0, right: 1, bottom: 1 };
+        ChangeRegion { class_before: ClassId(0), class_after: ClassId(3), bounds, mask: vec![1], pixels: 1 }
+    }
+
+    fn chair(east: f64) -> Descriptor {
+        Descriptor::Dynamic(DynamicDescriptor {
+            class: ClassId(5),
+            position: GridPoint::new(836_700.0 + east, 818_430.0, 7.2),
+            size_m: [0.5, 0.5, 0.9],
+            yaw_rad: None,
+            sigma: None,
+        })
+    }
+
+    fn place(descriptor: Descriptor) -> Proposal {
+        Proposal::Place { region: 0, descriptor }
+    }
+
+    fn remove(near: &Descriptor, sigma_m: f64) -> Proposal {
+        Proposal::Remove { region: 0, class: near.class(), near: near.anchor(), sigma_m }
+    }
+
+    #[test]
+    fn a_banner_that_is_there_already_is_not_added_again() {
+        let map = [(7, Descriptor::Material(banner(0.0, 0.0, 6.0, 4.0)))];
+        let seen = Descriptor::Material(banner(0.2, 0.2, 6.1, 4.0));
+        let resolution = resolve(vec![place(seen)], &[region()], &map);
+        assert!(resolution.changes.is_empty());
+        assert_eq!(resolution.rejections[0].requirement, "already-on-map");
+    }
+
+    #[test]
+    fn a_grown_banner_is_a_modification_not_an_add_beside_a_remove() {
+        let before = Descriptor::Material(banner(0.0, 0.0, 6.0, 4.0));
+        let after = Descriptor::Material(banner(-1.0, 0.0, 9.0, 4.0));
+        let resolution = resolve(vec![place(after.clone()), remove(&before, 0.1)], &[region()], &[(7, before.clone())]);
+        assert_eq!(resolution.changes, [Change::Modify { fid: 7, before, after }]);
+        assert_eq!(resolution.rejections[0].requirement, "nothing-to-remove");
+    }
+
+    #[test]
+    fn a_banner_on_another_wall_is_new() {
+        let map = [(7, Descriptor::Material(banner(0.0, 0.0, 6.0, 4.0)))];
+        let other = Descriptor::Material(banner(0.0, 20.0, 6.0, 4.0));
+        assert_eq!(resolve(vec![place(other.clone())], &[region()], &map).changes, [Change::Add(other)]);
+    }
+
+    #[test]
+    fn two_removals_take_two_chairs_and_each_the_nearest() {
+        let map = [(1, chair(0.0)), (2, chair(1.1)), (3, chair(50.0))];
+        let resolution = resolve(vec![remove(&chair(1.0), 0.2), remove(&chair(0.4), 0.2)], &[region()], &map);
+        let gone: Vec<u64> = resolution
+            .changes
+            .iter()
+            .map(|change| match change {
+                Change::Remove { fid, .. } => *fid,
+                other => panic!("expected a removal, found {other:?}"),
+            })
+            .collect();
+        assert_eq!(gone, [2, 1]);
+    }
+
+    #[test]
+    fn a_chair_100_m_away_is_not_removed() {
+        let resolution = resolve(vec![remove(&chair(0.0), 0.2)], &[region()], &[(3, chair(100.0))]);
+        assert!(resolution.changes.is_empty());
+        let Rejection { requirement, measured, limit, .. } = &resolution.rejections[0];
+        assert_eq!((requirement.as_str(), measured.round(), *limit), ("nothing-to-remove", 100.0, 3.0));
+    }
+
+    #[test]
+    fn a_chair_beside_another_is_a_second_chair() {
+        let resolution = resolve(vec![place(chair(1.1))], &[region()], &[(1, chair(0.0))]);
+        assert_eq!(resolution.changes, [Change::Add(chair(1.1))]);
+    }
+}
