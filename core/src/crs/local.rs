@@ -24,11 +24,20 @@ impl LocalOrigin {
 
     /// Offset of `point` in `f32`, metres; fails when an axis exceeds [`LOCAL_LIMIT_M`] or is not finite.
     pub fn to_local(&self, point: GridPoint) -> Result<[f32; 3], CrsError> {
-        let offset_m = self.offset_m(point);
-        if offset_m.iter().all(|axis_m| axis_m.abs() <= LOCAL_LIMIT_M) {
+        self.narrowed(point, self.offset_m(point), LOCAL_LIMIT_M)
+    }
+
+    /// Offset of `point` rounded to whole metres, which `f32` holds exactly; fails beyond 2²⁴ m or when not finite.
+    pub fn to_whole_metres(&self, point: GridPoint) -> Result<[f32; 3], CrsError> {
+        const EXACT_LIMIT_M: f64 = 16_777_216.0;
+        self.narrowed(point, self.offset_m(point).map(f64::round), EXACT_LIMIT_M)
+    }
+
+    fn narrowed(&self, point: GridPoint, offset_m: [f64; 3], limit_m: f64) -> Result<[f32; 3], CrsError> {
+        if offset_m.iter().all(|axis_m| axis_m.abs() <= limit_m) {
             Ok(offset_m.map(|axis_m| axis_m as f32))
         } else {
-            Err(CrsError::TooFarFromOrigin { point: point.into(), origin: self.origin.into() })
+            Err(CrsError::TooFarFromOrigin { point: point.into(), origin: self.origin.into(), limit_m })
         }
     }
 
@@ -92,5 +101,13 @@ mod tests {
         let local = LocalOrigin::new(ORIGIN).unwrap();
         assert!(local.to_local(GridPoint::new(836_694.0, f64::NAN, 0.0)).is_err());
         assert!(local.to_local(GridPoint::new(836_694.0, 819_069.0, f64::INFINITY)).is_err());
+    }
+
+    #[test]
+    fn whole_metres_are_exact_far_beyond_the_limit_of_offsets() {
+        let local = LocalOrigin::new(GridPoint::new(836_694.0, 819_069.0, 4.0)).unwrap();
+        let far = GridPoint::new(800_000.4, 850_000.6, -3.2);
+        assert_eq!(local.to_grid(local.to_whole_metres(far).unwrap()), GridPoint::new(800_000.0, 850_001.0, -3.0));
+        assert!(local.to_whole_metres(GridPoint::new(1e9, 0.0, 0.0)).is_err());
     }
 }

@@ -3,7 +3,7 @@
 use super::ellipsoid::WGS_84;
 #[cfg(feature = "proj")]
 use super::epsg;
-use super::{GridPoint, LOCAL_LIMIT_M, Wgs84, hk1980};
+use super::{GridPoint, Wgs84, hk1980};
 use std::fmt;
 use std::str::FromStr;
 
@@ -64,7 +64,7 @@ pub enum CrsError {
     /// A point too far from a local origin for `f32` offsets.
     #[error(
         "point {:.3}, {:.3}, {:.3} is {:.3} m from the local origin {:.3}, {:.3}, {:.3} along one axis; \
-         the limit is {LOCAL_LIMIT_M} m",
+         the limit is {limit_m} m",
         point[0], point[1], point[2], largest_difference_m(*point, *origin), origin[0], origin[1], origin[2]
     )]
     TooFarFromOrigin {
@@ -72,6 +72,8 @@ pub enum CrsError {
         point: [f64; 3],
         /// E, N, H of the origin.
         origin: [f64; 3],
+        /// Largest offset along an axis, metres.
+        limit_m: f64,
     },
     /// Another system than HK1980 Grid in a build without PROJ.
     #[error(

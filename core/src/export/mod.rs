@@ -1,1 +1,7 @@
 //! The map in other formats.
+
+mod gltf;
+mod scene;
+
+pub use gltf::{GltfFiles, glb, gltf};
+pub use scene::{ExportError, ExportScene};
