@@ -208,12 +208,12 @@ impl<'a> Writer<'a, '_> {
             root.extensions_used.push("KHR_materials_unlit".to_owned());
         }
         root.asset.generator = Some(concat!("resurvey ", env!("CARGO_PKG_VERSION")).to_owned());
-        root.asset.extras = extras(&json!({
+        root.asset.extras = extras(&json!({ "resurvey": {
             "version": self.scene.version,
             "crs": self.scene.crs,
             "vertical_datum": self.scene.vertical_datum,
-            "origin": self.origin.grid(),
-        }))?;
+            "grid_origin": self.origin.grid(),
+        } }))?;
         let map = root.push(Node {
             name: Some("map".to_owned()),
             matrix: Some(GLTF_FROM_MAP),

@@ -86,7 +86,7 @@ fn export(scene: &ExportScene) -> (::gltf::Gltf, Value, Vec<u8>) {
 /// Triangles of the named node as grid points, walked in `f64` from the asset's origin through the root matrix.
 fn triangles_of(document: &(::gltf::Gltf, Value, Vec<u8>), name: &str) -> Vec<[GridPoint; 3]> {
     let (gltf, json, blob) = document;
-    let origin: [f64; 3] = serde_json::from_value(json["asset"]["extras"]["origin"].clone()).unwrap();
+    let origin: [f64; 3] = serde_json::from_value(json["asset"]["extras"]["resurvey"]["grid_origin"].clone()).unwrap();
     let root = gltf.default_scene().unwrap().nodes().next().unwrap();
     let matrix = root.transform().matrix();
     let node = root.children().find(|node| node.name() == Some(name)).unwrap();
@@ -143,7 +143,7 @@ fn objects_and_descriptors_keep_their_places_names_and_ids() {
     assert_eq!(extras("banner 17")["corners"][2], serde_json::json!([835_600.02, 817_805.0, 6.1]));
     assert_eq!(extras("chair 18")["size_m"], serde_json::json!([2.0, 0.5, 0.9]));
     assert_eq!(extras("chair 18")["yaw_deg"], 90.0);
-    let asset = &document.1["asset"]["extras"];
+    let asset = &document.1["asset"]["extras"]["resurvey"];
     assert_eq!(asset["crs"], "EPSG:2326");
     assert_eq!(asset["vertical_datum"], "hkpd");
     assert_eq!(asset["version"], 12);
