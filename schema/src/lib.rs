@@ -12,6 +12,7 @@ pub mod localization;
 pub mod position;
 pub mod region;
 pub mod service;
+pub mod sql;
 
 pub use camera::{CameraModel, Intrinsics};
 pub use capture::{CameraFile, CaptureFile, PriorFile};

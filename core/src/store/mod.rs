@@ -1,1 +1,23 @@
 //! The map file: versions, features, observations in SQLite. All SQL of the project is here.
+
+mod commit;
+mod commit_error;
+mod conflict;
+mod error;
+mod feature_rows;
+mod history;
+mod index;
+mod map_file;
+mod observations;
+mod revisions;
+mod rows;
+mod snapshot;
+#[cfg(test)]
+mod tests;
+
+pub use commit_error::{CommitError, ConflictingChange};
+pub use error::StoreError;
+pub use history::Provenance;
+pub use map_file::{MapFile, MapInfo, NewMap};
+pub use observations::RecordedObservation;
+pub use snapshot::Snapshot;

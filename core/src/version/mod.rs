@@ -1,1 +1,29 @@
 //! The values of history: version ids, deltas, update transactions. No SQL, no file.
+
+mod box_mm;
+mod canonical;
+mod change_set;
+mod delta;
+mod descriptor_file;
+mod digest;
+mod evidence_file;
+mod feature_state;
+mod observation;
+mod operations;
+mod record;
+mod revision;
+mod transaction;
+
+pub use box_mm::{BoxMm, InvalidBox};
+pub use canonical::{CanonicalError, class_table_bytes};
+pub use change_set::{ChangeSet, ChangeSetError, read_change_set, write_change_set};
+pub use delta::{Counts, Delta};
+pub use descriptor_file::{InvalidDescriptor, descriptor_from_file, descriptor_to_file};
+pub use digest::{Digest, InvalidDigest};
+pub use feature_state::{FeatureState, InvalidState};
+pub use observation::{Decision, Gate, LocalizationEvidence, Observation, PluginUse};
+pub use operations::{Frame, Operations, version_hash};
+pub use record::{Feature, VersionRecord};
+pub(crate) use revision::is_tag_name;
+pub use revision::{InvalidRevision, Revision};
+pub use transaction::{Fid, UpdateTransaction, VersionId, VersionKind};

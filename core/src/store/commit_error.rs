@@ -1,0 +1,114 @@
+//! Why a transaction is not committed.
+
+use super::error::StoreError;
+use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId};
+
+/// Why a transaction was not committed; the map is as it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CommitError {
+    /// The map changed since the base version, or is not what the transaction takes it to be.
+    #[error("the map changed between version {base} and version {head}: {}", list(changed))]
+    Conflict {
+        /// The version the transaction was worked out against.
+        base: VersionId,
+        /// The newest version.
+        head: VersionId,
+        /// What is not as expected, by rising feature number.
+        changed: Vec<ConflictingChange>,
+    },
+    /// Nothing to commit.
+    #[error("the transaction changes nothing; expected at least one feature or a class table")]
+    Empty,
+    /// Only the creation of a map makes this kind.
+    #[error("a commit cannot be of kind \"init\"")]
+    Kind,
+    /// Two deltas for one feature.
+    #[error("feature {fid} has two deltas; expected one at most")]
+    Twice {
+        /// The feature.
+        fid: Fid,
+    },
+    /// A delta whose sides are the same.
+    #[error("the delta of feature {fid} changes nothing")]
+    NoChange {
+        /// The feature.
+        fid: Fid,
+    },
+    /// A number no feature can have.
+    #[error("feature number {} is not between 1 and {}", .fid.0, Fid::MAX)]
+    FidRange {
+        /// The number.
+        fid: Fid,
+    },
+    /// A state that cannot be in a map.
+    #[error("{feature}: {error}")]
+    State {
+        /// `feature 7`, or `addition 0` counted from 0.
+        feature: String,
+        /// Why.
+        error: InvalidState,
+    },
+    /// Too far from the rest of the map.
+    #[error("{feature} lies more than 2 147 km from the middle of the map's index")]
+    OutsideIndex {
+        /// `feature 7`.
+        feature: String,
+    },
+    /// An object whose geometry is neither in the map nor in the transaction.
+    #[error("object {name:?} needs geometry {digest}, which is neither in the map nor in the transaction")]
+    NoGeometry {
+        /// Name of the object.
+        name: String,
+        /// What it needs.
+        digest: Digest,
+    },
+    /// Geometry under a digest that is not its own.
+    #[error("geometry given as {given} has digest {found}")]
+    WrongDigest {
+        /// What the transaction says.
+        given: Digest,
+        /// What it is.
+        found: Digest,
+    },
+    /// A class that goes or changes its kind.
+    #[error(
+        "the new class table drops or changes the kind of class {class:?}; a class may only be renamed, recoloured or added"
+    )]
+    ClassLost {
+        /// Its name in the old table.
+        class: String,
+    },
+    /// The file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// One thing that is not as a transaction expects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConflictingChange {
+    /// The feature.
+    pub fid: Fid,
+    /// The version that changed it last; `None` when no version ever had it.
+    pub changed_in: Option<VersionId>,
+    /// Its live state; `None` when it is not in the map.
+    pub found: Option<FeatureState>,
+    /// Whether the transaction changes it; else it only lies in the viewed region.
+    pub is_target: bool,
+}
+
+fn list(changed: &[ConflictingChange]) -> String {
+    const SHOWN: usize = 5;
+    let one = |change: &ConflictingChange| {
+        let place = if change.is_target { "" } else { " in the viewed region" };
+        match change.changed_in {
+            Some(version) => format!("feature {}{place} (version {version})", change.fid),
+            None => format!("feature {} was never there", change.fid),
+        }
+    };
+    let mut text = changed.iter().take(SHOWN).map(one).collect::<Vec<_>>().join(", ");
+    if changed.len() > SHOWN {
+        text += &format!(" and {} more", changed.len() - SHOWN);
+    }
+    text
+}

@@ -1,0 +1,100 @@
+//! What a transaction expects of the live map, and where it is wrong.
+
+use super::commit_error::{CommitError, ConflictingChange};
+use super::error::Fault;
+use super::index::IndexOrigin;
+use super::map_file::WriteFault;
+use super::snapshot::feature_at;
+use crate::version::{BoxMm, Delta, FeatureState, Fid, UpdateTransaction, VersionId};
+use rusqlite::{Connection, named_params};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A row of `feature_version` that is live.
+pub(super) struct LiveRow {
+    /// Its key.
+    pub(super) id: i64,
+    /// What the feature is now.
+    pub(super) state: FeatureState,
+}
+
+/// The live rows of the features that `deltas` change.
+pub(super) fn live_rows(connection: &Connection, deltas: &[Delta]) -> Result<BTreeMap<Fid, LiveRow>, Fault> {
+    // The literal condition makes the partial index usable.
+    const SQL: &str = "SELECT id, state FROM feature_version
+        WHERE fid = :fid AND to_version IS NULL ORDER BY id";
+    let mut statement = connection.prepare_cached(SQL)?;
+    let mut live = BTreeMap::new();
+    for fid in deltas.iter().map(Delta::fid) {
+        let mut rows = statement.query(named_params! {":fid": fid.0 as i64})?;
+        let Some(row) = rows.next()? else { continue };
+        let state = FeatureState::from_bytes(row.get_ref(1)?.as_blob().map_err(rusqlite::Error::from)?);
+        let state = state.map_err(|error| Fault::Damage(format!("live state of feature {fid}: {error}")))?;
+        live.insert(fid, LiveRow { id: row.get(0)?, state });
+    }
+    Ok(live)
+}
+
+/// Refuses the transaction when a `before` is not live, or when something changed in the viewed region since its base.
+pub(super) fn check_conflicts(
+    connection: &Connection,
+    transaction: &UpdateTransaction,
+    live: &BTreeMap<Fid, LiveRow>,
+    head: VersionId,
+) -> Result<(), WriteFault<CommitError>> {
+    let mut changed = BTreeMap::new();
+    if let Some(region) = &transaction.viewed_region {
+        for fid in changed_since(connection, region, transaction.base)? {
+            changed.insert(fid, false);
+        }
+    }
+    for delta in &transaction.deltas {
+        let found = live.get(&delta.fid()).map(|row| &row.state);
+        let as_expected = match (delta.before(), found) {
+            (Some(before), Some(found)) => before.is_same_as(found),
+            (before, found) => before.is_none() && found.is_none(),
+        };
+        if !as_expected {
+            changed.insert(delta.fid(), true);
+        }
+    }
+    if changed.is_empty() {
+        return Ok(());
+    }
+    let describe = |(fid, is_target): (Fid, bool)| -> Result<ConflictingChange, Fault> {
+        let found = feature_at(connection, fid, head)?.map(|feature| feature.state);
+        Ok(ConflictingChange { fid, changed_in: last_change(connection, fid)?, found, is_target })
+    };
+    let changed = changed.into_iter().map(describe).collect::<Result<_, Fault>>()?;
+    Err(WriteFault::Refused(CommitError::Conflict { base: transaction.base, head, changed }))
+}
+
+/// Features in `region` whose state began or ended after `base`.
+fn changed_since(connection: &Connection, region: &BoxMm, base: VersionId) -> Result<BTreeSet<Fid>, Fault> {
+    const BEGAN: &str = "SELECT f.fid FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
+        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
+            AND i.v0 > :base ORDER BY f.fid";
+    const ENDED: &str = "SELECT f.fid FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
+        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
+            AND i.v1 >= :base AND i.v1 < 2147483647 ORDER BY f.fid";
+    let mut changed = BTreeSet::new();
+    let Some(origin) = IndexOrigin::read(connection)? else { return Ok(changed) };
+    let Some([e0, e1, n0, n1, h0, h1]) = origin.clamp(region) else { return Ok(changed) };
+    for sql in [BEGAN, ENDED] {
+        let mut statement = connection.prepare_cached(sql)?;
+        let mut rows = statement.query(named_params! {
+            ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1, ":base": base.0 as i64,
+        })?;
+        while let Some(row) = rows.next()? {
+            changed.insert(Fid(row.get::<_, i64>(0)?.unsigned_abs()));
+        }
+    }
+    Ok(changed)
+}
+
+/// The last version that began or ended a state of `fid`.
+fn last_change(connection: &Connection, fid: Fid) -> Result<Option<VersionId>, Fault> {
+    const SQL: &str = "SELECT max(coalesce(to_version, from_version)) FROM feature_version WHERE fid = :fid ORDER BY 1";
+    let mut statement = connection.prepare_cached(SQL)?;
+    let last: Option<i64> = statement.query_row(named_params! {":fid": fid.0 as i64}, |row| row.get(0))?;
+    Ok(last.map(|version| VersionId(version.unsigned_abs())))
+}

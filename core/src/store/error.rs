@@ -1,0 +1,237 @@
+//! What can be wrong with a map file or a question to it.
+
+use crate::version::{Digest, Fid, InvalidRevision, VersionId};
+use jiff::Timestamp;
+use rusqlite::ErrorCode;
+use std::path::{Path, PathBuf};
+
+/// Why the map could not answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// No file there.
+    #[error("{}: no such map; \"resurvey init\" makes one", .path.display())]
+    NotFound {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file is there already.
+    #[error("{}: exists already; expected a path without a file", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Some other file.
+    #[error("{}: not a map; expected a resurvey map file, found {found}", .path.display())]
+    NotAMap {
+        /// The file.
+        path: PathBuf,
+        /// What it seems to be.
+        found: String,
+    },
+    /// Written by a newer program.
+    #[error("{}: the map has format {found}, this program reads formats up to {supported}; upgrade resurvey", .path.display())]
+    NewerFormat {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        found: i32,
+        /// The newest one known here.
+        supported: i32,
+    },
+    /// Contents that cannot be.
+    #[error("{}: the map file is damaged: {detail}; \"resurvey fsck\" lists what is wrong", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        detail: String,
+    },
+    /// Another writer had it for longer than the time to wait.
+    #[error("{}: another process is writing to the map; try again when it is done", .path.display())]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Only reading is allowed.
+    #[error("{}: the map is read-only; expected a file and a directory that can be written", .path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system cannot hold a write-ahead log.
+    #[error("{}: the map needs a write-ahead log beside it and {detail}; keep it in a directory that can be written, on a local disk (not a network file system)", .path.display())]
+    NoWriteAheadLog {
+        /// The file.
+        path: PathBuf,
+        /// What was found instead.
+        detail: String,
+    },
+    /// No room on the disk; nothing was written.
+    #[error("{}: the disk is full; the map is unchanged", .path.display())]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{}: {detail}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        detail: String,
+    },
+    /// A number above the newest.
+    #[error("no version {version}; the newest is {head}")]
+    NoSuchVersion {
+        /// What was asked for.
+        version: VersionId,
+        /// The newest.
+        head: VersionId,
+    },
+    /// Not in the map at that version.
+    #[error("no feature {fid} at version {version}")]
+    NoSuchFeature {
+        /// What was asked for.
+        fid: Fid,
+        /// Where.
+        version: VersionId,
+    },
+    /// Not in the map at any version.
+    #[error("no feature {fid} at any version")]
+    NeverAFeature {
+        /// What was asked for.
+        fid: Fid,
+    },
+    /// A name nobody gave.
+    #[error("no tag {name:?}; \"resurvey tag\" gives names")]
+    NoSuchTag {
+        /// What was asked for.
+        name: String,
+    },
+    /// A name that has a version.
+    #[error("tag {name:?} names version {version} already")]
+    TagTaken {
+        /// The name.
+        name: String,
+        /// What it names.
+        version: VersionId,
+    },
+    /// A name that no tag can have.
+    #[error("{name:?} cannot be a tag; expected letters, digits and . _ - /, not a number, not \"head\"")]
+    TagName {
+        /// What was given.
+        name: String,
+    },
+    /// Before there was a map.
+    #[error("no version at {asked}; the first was made at {first}")]
+    BeforeFirst {
+        /// What was asked for.
+        asked: Timestamp,
+        /// The time of version 0.
+        first: Timestamp,
+    },
+    /// Not a revision at all.
+    #[error(transparent)]
+    Revision(#[from] InvalidRevision),
+    /// A class table that no map takes.
+    #[error("class table: {detail}")]
+    ClassTable {
+        /// Why.
+        detail: String,
+    },
+    /// Evidence that cannot be written down.
+    #[error("observation: {detail}")]
+    Observation {
+        /// Why.
+        detail: String,
+    },
+    /// Geometry that the map does not have.
+    #[error("no geometry {digest}")]
+    NoSuchGeometry {
+        /// What was asked for.
+        digest: Digest,
+    },
+    /// No such proposal.
+    #[error("no proposal {id}")]
+    NoSuchProposal {
+        /// What was asked for.
+        id: u64,
+    },
+    /// The proposal was decided before.
+    #[error("proposal {id} is {status} already")]
+    ProposalDecided {
+        /// The proposal.
+        id: u64,
+        /// `accepted` or `rejected`.
+        status: String,
+    },
+    /// A statement that should not be able to fail did.
+    #[error("{}: {detail}; this is a bug in resurvey", .path.display())]
+    Internal {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        detail: String,
+    },
+}
+
+/// What goes wrong inside the store, before the path is known.
+#[derive(Debug)]
+pub(super) enum Fault {
+    Sql(rusqlite::Error),
+    Damage(String),
+    Store(StoreError),
+}
+
+impl From<rusqlite::Error> for Fault {
+    fn from(error: rusqlite::Error) -> Self {
+        Self::Sql(error)
+    }
+}
+
+impl From<StoreError> for Fault {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
+impl Fault {
+    /// The error as the map at `path` reports it.
+    pub(super) fn at(self, path: &Path) -> StoreError {
+        let path = path.to_owned();
+        match self {
+            Self::Store(error) => error,
+            Self::Damage(detail) => StoreError::Damaged { path, detail },
+            Self::Sql(error) => sql_error(&error, path),
+        }
+    }
+}
+
+fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
+    let detail = error.to_string();
+    match error {
+        rusqlite::Error::SqliteFailure(failure, _) => match failure.code {
+            ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { path },
+            ErrorCode::DatabaseCorrupt => StoreError::Damaged { path, detail },
+            ErrorCode::NotADatabase => StoreError::NotAMap { path, found: "no SQLite database".to_owned() },
+            ErrorCode::ReadOnly => StoreError::ReadOnly { path },
+            ErrorCode::DiskFull => StoreError::Full { path },
+            ErrorCode::CannotOpen => {
+                StoreError::NoWriteAheadLog { path, detail: format!("it cannot be made ({detail})") }
+            }
+            ErrorCode::SystemIoFailure | ErrorCode::PermissionDenied | ErrorCode::NoLargeFileSupport => {
+                StoreError::Io { path, detail }
+            }
+            // "no such table", and vtab complaints about missing shadow rows.
+            _ if detail.contains("no such") => StoreError::Damaged { path, detail },
+            _ => StoreError::Internal { path, detail },
+        },
+        rusqlite::Error::FromSqlConversionFailure(..)
+        | rusqlite::Error::IntegralValueOutOfRange(..)
+        | rusqlite::Error::InvalidColumnType(..)
+        | rusqlite::Error::Utf8Error(..)
+        | rusqlite::Error::QueryReturnedNoRows => StoreError::Damaged { path, detail },
+        _ => StoreError::Internal { path, detail },
+    }
+}

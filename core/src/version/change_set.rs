@@ -1,0 +1,172 @@
+//! Change sets (`resurvey.changes/1`): deltas of descriptors as JSON lines, out of one map and into another.
+
+use super::{
+    Delta, FeatureState, Fid, InvalidDescriptor, UpdateTransaction, VersionId, VersionKind, descriptor_from_file,
+    descriptor_to_file,
+};
+use resurvey_schema::ClassTable;
+use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, Op};
+
+/// A change set that was read and checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChangeSet {
+    /// Version the deltas were made against; `None` applies to any.
+    pub base: Option<VersionId>,
+    /// Who made it.
+    pub author: Option<String>,
+    /// Why.
+    pub message: Option<String>,
+    /// Features without a number.
+    pub additions: Vec<FeatureState>,
+    /// Changes of numbered features.
+    pub deltas: Vec<Delta>,
+}
+
+/// Why a text is not a change set.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChangeSetError {
+    /// Not one line.
+    #[error("line 1: expected a header {{\"format\":\"{FORMAT}\",…}}, found nothing")]
+    Empty,
+    /// Another format.
+    #[error("line 1: expected format {FORMAT:?}, found {0:?}")]
+    Format(String),
+    /// Not JSON, or not of the right shape.
+    #[error("line {line}: {detail}")]
+    Syntax {
+        /// Counted from 1.
+        line: usize,
+        /// What the parser says.
+        detail: String,
+    },
+    /// Sides that do not fit the operation.
+    #[error("line {line}: {op:?} needs {needs}")]
+    Sides {
+        /// Counted from 1.
+        line: usize,
+        /// The operation.
+        op: Op,
+        /// The keys it needs.
+        needs: &'static str,
+    },
+    /// A feature number that no map gives.
+    #[error("line {line}: fid {fid} is not between 1 and {}", Fid::MAX)]
+    Fid {
+        /// Counted from 1.
+        line: usize,
+        /// What was found.
+        fid: u64,
+    },
+    /// A descriptor that is none.
+    #[error("line {line}, {side}: {error}")]
+    Descriptor {
+        /// Counted from 1.
+        line: usize,
+        /// `before` or `after`.
+        side: &'static str,
+        /// Why.
+        error: InvalidDescriptor,
+    },
+}
+
+impl ChangeSet {
+    /// The transaction that applies it, against `head` where it names no base.
+    pub fn into_transaction(self, head: VersionId) -> UpdateTransaction {
+        let author = self.author.unwrap_or_default();
+        let message = self.message.unwrap_or_default();
+        let mut transaction = UpdateTransaction::new(self.base.unwrap_or(head), VersionKind::Apply, author, message);
+        transaction.additions = self.additions;
+        transaction.deltas = self.deltas;
+        transaction
+    }
+}
+
+/// Reads a change set for a map with `classes`. Empty lines are skipped.
+pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, ChangeSetError> {
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let (number, first) = lines.next().ok_or(ChangeSetError::Empty)?;
+    let syntax = |number: usize| {
+        move |error: serde_json::Error| ChangeSetError::Syntax { line: number + 1, detail: error.to_string() }
+    };
+    let header: ChangeSetHeader = serde_json::from_str(first).map_err(syntax(number))?;
+    if header.format != FORMAT {
+        return Err(ChangeSetError::Format(header.format));
+    }
+    let mut set = ChangeSet {
+        base: header.base_version.map(VersionId),
+        author: header.author,
+        message: header.message,
+        additions: Vec::new(),
+        deltas: Vec::new(),
+    };
+    for (number, line) in lines {
+        let change: ChangeLine = serde_json::from_str(line).map_err(syntax(number))?;
+        read_line(&change, number + 1, classes, &mut set)?;
+    }
+    Ok(set)
+}
+
+fn read_line(
+    change: &ChangeLine,
+    line: usize,
+    classes: &ClassTable,
+    set: &mut ChangeSet,
+) -> Result<(), ChangeSetError> {
+    if let Some(fid) = change.fid.filter(|fid| !(1..=Fid::MAX.0).contains(fid)) {
+        return Err(ChangeSetError::Fid { line, fid });
+    }
+    let state = |side, file: &Option<DescriptorFile>| {
+        let read = |file| descriptor_from_file(file, classes).map(FeatureState::Descriptor);
+        file.as_ref().map(read).transpose().map_err(|error| ChangeSetError::Descriptor { line, side, error })
+    };
+    let (before, after) = (state("before", &change.before)?, state("after", &change.after)?);
+    match (change.op, change.fid.map(Fid), before, after) {
+        (Op::Add, None, None, Some(after)) => set.additions.push(after),
+        (Op::Add, Some(fid), None, Some(after)) => set.deltas.push(Delta::add(fid, after)),
+        (Op::Remove, Some(fid), Some(before), None) => set.deltas.push(Delta::remove(fid, before)),
+        (Op::Modify, Some(fid), Some(before), Some(after)) => set.deltas.push(Delta::modify(fid, before, after)),
+        (op, ..) => {
+            let needs = match op {
+                Op::Add => "\"after\" and no \"before\"",
+                Op::Remove => "\"fid\", \"before\" and no \"after\"",
+                Op::Modify => "\"fid\", \"before\" and \"after\"",
+            };
+            return Err(ChangeSetError::Sides { line, op, needs });
+        }
+    }
+    Ok(())
+}
+
+/// The change set of `deltas` as JSON lines, and the objects among them: change sets carry descriptors only.
+pub fn write_change_set(
+    header: &ChangeSetHeader,
+    deltas: &[Delta],
+    classes: &ClassTable,
+) -> Result<(String, Vec<Fid>), serde_json::Error> {
+    let mut text = serde_json::to_string(header)? + "\n";
+    let mut left_out = Vec::new();
+    for delta in deltas {
+        match delta_to_line(delta, classes) {
+            Some(line) => text += &(serde_json::to_string(&line)? + "\n"),
+            None => left_out.push(delta.fid()),
+        }
+    }
+    Ok((text, left_out))
+}
+
+/// The line of `delta`; `None` when a side is an object.
+fn delta_to_line(delta: &Delta, classes: &ClassTable) -> Option<ChangeLine> {
+    let side = |state: Option<&FeatureState>| match state {
+        None => Some(None),
+        Some(FeatureState::Descriptor(descriptor)) => Some(Some(descriptor_to_file(descriptor, classes))),
+        Some(FeatureState::Object { .. }) => None,
+    };
+    let (before, after) = (side(delta.before())?, side(delta.after())?);
+    let op = match (&before, &after) {
+        (None, _) => Op::Add,
+        (Some(_), None) => Op::Remove,
+        (Some(_), Some(_)) => Op::Modify,
+    };
+    Some(ChangeLine { op, fid: Some(delta.fid().0), before, after })
+}

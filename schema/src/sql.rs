@@ -1,0 +1,7 @@
+//! The tables of a map file. A released file never changes: a new format is a new migration.
+
+/// `application_id` of a map file: the letters `RSVY`.
+pub const APPLICATION_ID: i32 = 0x5253_5659;
+
+/// Migrations in order; a file with `user_version` n has had the first n of them.
+pub const MIGRATIONS: &[&str] = &[include_str!("../sql/0001_map.sql")];
