@@ -133,7 +133,7 @@ impl Camera {
             }
         }
         for (field, found) in [("cx", intrinsics.cx), ("cy", intrinsics.cy)] {
-            if !(found.abs() <= 1e9) {
+            if found.is_nan() || found.abs() > 1e9 {
                 return Err(CameraError::Number { field, expected: "a number between -1e9 and 1e9", found });
             }
         }

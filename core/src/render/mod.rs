@@ -6,12 +6,17 @@ pub mod panorama;
 mod plate;
 mod projection;
 mod raster;
+mod rays;
 mod scene;
 mod setup;
 mod texture;
 mod view;
 
+#[cfg(test)]
+mod tests;
+
 pub use raster::Renderer;
+pub use rays::{Hit, Nearest, RayCaster};
 pub use scene::{Cluster, Scene, SceneObject};
 pub use texture::texel_class;
 pub use view::{View, view};

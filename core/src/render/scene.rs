@@ -1,7 +1,9 @@
 //! The triangles of the map around a local origin: what the rasteriser and the rays see.
 
 use super::plate;
+use super::texture::UvRange;
 use crate::mesh::{Mesh, Object, Surface};
+use nalgebra::Vector3;
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::{ClassId, ClassTable, Descriptor, GridPoint};
 use std::ops::Range;
@@ -103,6 +105,23 @@ impl Scene {
         }
     }
 
+    /// Texture coordinates at an offset on `triangle`, held inside the triangle's own range; panics outside the
+    /// triangles.
+    pub fn uv_at(&self, triangle: usize, offset: [f64; 3]) -> [f32; 2] {
+        let uvs = &self.uvs[triangle];
+        let [a, b, c] = self.positions[triangle].map(|corner| Vector3::from(corner.map(f64::from)));
+        let normal = (b - a).cross(&(c - a));
+        let area = normal.norm_squared();
+        if area < f64::MIN_POSITIVE {
+            return uvs[0];
+        }
+        let point = Vector3::from(offset);
+        let weight = |from: &Vector3<f64>, to: &Vector3<f64>| (to - from).cross(&(point - from)).dot(&normal) / area;
+        let weights = [weight(&b, &c), weight(&c, &a), weight(&a, &b)];
+        let uv = std::array::from_fn(|axis| (0..3).map(|k| weights[k] * f64::from(uvs[k][axis])).sum::<f64>() as f32);
+        UvRange::of(uvs).hold(uv)
+    }
+
     /// 0 for a triangle of the base map, otherwise 1 + index into the feature table; panics outside.
     pub fn feature(&self, triangle: usize) -> u32 {
         self.features[triangle]
@@ -152,10 +171,8 @@ impl Scene {
         for (triangle, &surface) in mesh.triangles.iter().zip(&mesh.triangle_surfaces) {
             let triangle = triangle.map(|vertex| vertex as usize);
             let textured = matches!(mesh.surfaces.get(usize::from(surface)), Some(Surface::Texture(_)));
-            self.positions.push(triangle.map(|vertex| corners[vertex]));
-            self.uvs.push(if textured { triangle.map(|vertex| uv_of(mesh, vertex)) } else { [[0.0; 2]; 3] });
-            self.surface_indices.push(first_surface + u32::from(surface));
-            self.features.push(0);
+            let uvs = if textured { triangle.map(|vertex| uv_of(mesh, vertex)) } else { [[0.0; 2]; 3] };
+            self.push(triangle.map(|vertex| corners[vertex]), uvs, first_surface + u32::from(surface), 0);
         }
         self.objects.push(SceneObject { fid, triangles: start..self.positions.len() });
         self.add_clusters(start);
@@ -172,12 +189,19 @@ impl Scene {
         let surface = self.surfaces.len() as u32;
         self.surfaces.push(Surface::Class(descriptor.class()));
         for triangle in triangles {
-            self.positions.push(triangle.map(|corner| to_local(corner, [0.0; 3])));
-            self.uvs.push([[0.0; 2]; 3]);
+            self.push(triangle.map(|corner| to_local(corner, [0.0; 3])), [[0.0; 2]; 3], surface, feature);
+        }
+        self.add_clusters(start);
+    }
+
+    /// Adds a triangle; one with a coordinate that is not a number is nowhere and is left out.
+    fn push(&mut self, corners: [[f32; 3]; 3], uvs: [[f32; 2]; 3], surface: u32, feature: u32) {
+        if corners.iter().flatten().all(|value| value.is_finite()) {
+            self.positions.push(corners);
+            self.uvs.push(uvs);
             self.surface_indices.push(surface);
             self.features.push(feature);
         }
-        self.add_clusters(start);
     }
 
     fn add_clusters(&mut self, start: usize) {

@@ -3,7 +3,7 @@
 
 use super::projection::{NEAR_M, Projection};
 use super::scene::Scene;
-use super::texel_class;
+use super::texture::{UvRange, texel_class};
 use crate::mesh::{LabelTexture, Surface};
 use nalgebra::Vector3;
 use resurvey_schema::ClassId;
@@ -14,10 +14,6 @@ use std::ops::Range;
 const FLAT: f64 = 1e-14;
 /// Slack of the row range, pixels; the edges decide.
 const ROW_SLACK_PX: f64 = 1e-3;
-/// Texture coordinates stay this share of the triangle's own range inside it, so that rounding at its rim does not wrap
-/// round to the other side of the texture.
-const UV_INSET: f32 = 1e-6;
-
 /// A triangle that may show.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setup {
@@ -39,8 +35,7 @@ pub(super) enum Shade {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UvForms {
     forms: [[f64; 3]; 2],
-    low: [f32; 2],
-    high: [f32; 2],
+    range: UvRange,
 }
 
 /// The half planes whose intersection a triangle covers.
@@ -68,7 +63,7 @@ pub(super) fn setup(scene: &Scene, projection: &Projection, triangle: u32) -> Op
     let [a, b, c] = &corners;
     let forms = [b.cross(c), c.cross(a), a.cross(b)];
     let volume = a.dot(&forms[0]);
-    if !(volume.abs() > FLAT * a.norm() * b.norm() * c.norm()) {
+    if volume.is_nan() || volume.abs() <= FLAT * a.norm() * b.norm() * c.norm() {
         return None;
     }
     let inverse_depth = (forms[0] + forms[1] + forms[2]) / volume;
@@ -104,7 +99,7 @@ impl Setup {
             Shade::Texture(forms) => {
                 let depth = 1.0 / self.inverse_depth_at(u, v);
                 let uv = forms.forms.map(|[x, y, constant]| ((x * u + (y * v + constant)) * depth) as f32);
-                scene.class_at(self.triangle as usize, forms.inset(uv))
+                scene.class_at(self.triangle as usize, forms.range.hold(uv))
             }
         }
     }
@@ -115,19 +110,7 @@ impl UvForms {
         let form = |axis: usize| {
             (0..3).map(|corner| forms[corner] * f64::from(uvs[corner][axis])).sum::<Vector3<f64>>() / volume
         };
-        let low: [f32; 2] = std::array::from_fn(|axis| uvs.iter().fold(f32::INFINITY, |low, uv| low.min(uv[axis])));
-        let high: [f32; 2] =
-            std::array::from_fn(|axis| uvs.iter().fold(f32::NEG_INFINITY, |high, uv| high.max(uv[axis])));
-        let inset: [f32; 2] = std::array::from_fn(|axis| (high[axis] - low[axis]) * UV_INSET);
-        Self {
-            forms: [form(0).into(), form(1).into()],
-            low: [low[0] + inset[0], low[1] + inset[1]],
-            high: [high[0] - inset[0], high[1] - inset[1]],
-        }
-    }
-
-    fn inset(&self, uv: [f32; 2]) -> [f32; 2] {
-        std::array::from_fn(|axis| uv[axis].max(self.low[axis]).min(self.high[axis]))
+        Self { forms: [form(0).into(), form(1).into()], range: UvRange::of(uvs) }
     }
 
     /// Classes of the pixels from column `u`, row `v` on.
@@ -144,7 +127,7 @@ impl UvForms {
             let along = (index as i32) as f32;
             let depth = 1.0 / (starts[2] + steps[2] * along);
             let uv = [(starts[0] + steps[0] * along) * depth, (starts[1] + steps[1] * along) * depth];
-            let [u, v] = self.inset(uv);
+            let [u, v] = self.range.hold(uv);
             *pixel = texel_class(texture, u, v).0;
         }
     }

@@ -3,9 +3,10 @@
 
 use super::projection::Projection;
 use super::raster::Renderer;
+use super::rays::RayCaster;
 use super::scene::Scene;
 use super::setup::Setup;
-use crate::camera::{Camera, Pinhole};
+use crate::camera::{Camera, Pinhole, world_from_camera};
 use crate::image::{LabelImage, Raster};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -102,7 +103,27 @@ fn pixel(scene: &Scene, projection: &Projection, setup: &Setup, [u, v]: [f64; 2]
     }
 }
 
+/// Range from which a ray looks, metres; the counterpart of the rasteriser's least depth.
+const FIRST_RANGE_M: f64 = super::projection::NEAR_M;
+
 fn cast(scene: &Scene, camera: &Camera, pose: &Pose) -> View {
-    let _ = pose;
-    View::empty(scene, camera.width(), camera.height())
+    let caster = RayCaster::new(scene);
+    let world_from_camera = world_from_camera(pose);
+    let mut view = View::empty(scene, camera.width(), camera.height());
+    view.fill(|v| {
+        let caster = &caster;
+        (0..camera.width()).map(move |u| {
+            let direction = world_from_camera * camera.ray(f64::from(u) + 0.5, v as f64 + 0.5)?;
+            let start = Vector3::from(scene.offset(pose.position)) + direction * FIRST_RANGE_M;
+            let hit = caster.cast(scene.point(start.into()), direction.into(), f64::INFINITY)?;
+            let [x, y, z] = scene.offset(hit.point);
+            Some(Pixel {
+                class: hit.class.0,
+                range_m: (hit.range_m + FIRST_RANGE_M) as f32,
+                point: [x as f32, y as f32, z as f32],
+                feature: hit.feature,
+            })
+        })
+    });
+    view
 }

@@ -1,5 +1,6 @@
 //! Reads the cases of `shared/cases`: just enough GLB for their maps, so that rendering is checked without the importer.
 #![allow(dead_code, reason = "every test binary uses its own share")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a broken case is a failed test")]
 
 use resurvey_core::camera::Camera;
 use resurvey_core::image::LabelImage;
