@@ -2,6 +2,7 @@
 //! queries.
 
 mod frame;
+pub mod lidar;
 pub mod panorama;
 mod plate;
 mod projection;
@@ -9,6 +10,7 @@ mod raster;
 mod rays;
 mod scene;
 mod setup;
+mod solid;
 mod texture;
 mod view;
 
@@ -18,5 +20,6 @@ mod tests;
 pub use raster::Renderer;
 pub use rays::{Hit, Nearest, RayCaster};
 pub use scene::{Cluster, Scene, SceneObject};
+pub use solid::{SolidMask, inside_solid};
 pub use texture::texel_class;
 pub use view::{View, view};

@@ -53,17 +53,15 @@ pub struct Resolution {
 
 /// Makes changes of `proposals` about `regions` on a map with `descriptors`. Each descriptor of the map is changed at
 /// most once.
-pub fn resolve(
-    proposals: Vec<Proposal>,
-    regions: &[ChangeRegion],
-    descriptors: &[(u64, Descriptor)],
-) -> Resolution {
+pub fn resolve(proposals: Vec<Proposal>, regions: &[ChangeRegion], descriptors: &[(u64, Descriptor)]) -> Resolution {
     let mut resolver = Resolver { regions, descriptors, taken: Vec::new(), resolution: Resolution::default() };
     let mut removals = Vec::new();
     for proposal in proposals {
         match proposal {
             Proposal::Place { region, descriptor } => resolver.place(region, descriptor),
-            Proposal::Remove { region, class, near, sigma_m } => removals.push(Removal { region, class, near, sigma_m }),
+            Proposal::Remove { region, class, near, sigma_m } => {
+                removals.push(Removal { region, class, near, sigma_m })
+            }
             Proposal::Reject { rejection, .. } => resolver.resolution.rejections.push(rejection),
         }
     }
@@ -138,9 +136,16 @@ impl Resolver<'_> {
         }
         for (removal, _) in removals.iter().zip(&served).filter(|(_, served)| !**served) {
             let of_class = self.descriptors.iter().filter(|(_, present)| present.class() == removal.class);
-            let nearest_m = of_class.map(|(_, present)| distance_m(removal.near, present.anchor())).min_by(f64::total_cmp);
+            let nearest_m =
+                of_class.map(|(_, present)| distance_m(removal.near, present.anchor())).min_by(f64::total_cmp);
             // A map without any such descriptor has none in any reach; the reach itself is the one honest number then.
-            self.reject(removal.region, "nothing-to-remove", nearest_m.unwrap_or(reach_m(removal)), reach_m(removal), "m");
+            self.reject(
+                removal.region,
+                "nothing-to-remove",
+                nearest_m.unwrap_or(reach_m(removal)),
+                reach_m(removal),
+                "m",
+            );
         }
     }
 

@@ -3,6 +3,8 @@
 mod agreement;
 mod analytic;
 mod descriptors;
+mod lidar;
+mod solid;
 
 use super::Scene;
 use crate::camera::Camera;
