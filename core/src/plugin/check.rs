@@ -1,0 +1,181 @@
+//! What the host checks in every answer before anyone sees it.
+
+use resurvey_schema::{
+    ChangeRegion, ClassId, ClassKind, ClassTable, Descriptor, GridPoint, Localization, Proposal, Uncertainty,
+};
+use std::fmt::Display;
+
+/// How far the length of a unit normal may be from 1: room for one that was computed in `f32`.
+const NORMAL_TOLERANCE: f64 = 1e-6;
+/// How far a covariance may be from symmetric, relative to its largest entry: rounding of one matrix product.
+const SYMMETRY_TOLERANCE: f64 = 1e-9;
+
+/// A value that breaks a rule.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Violation {
+    pub field: String,
+    pub value: String,
+    pub expected: String,
+}
+
+pub(super) fn violation(
+    field: impl Into<String>,
+    value: &dyn Display,
+    expected: impl Into<String>,
+) -> Result<(), Violation> {
+    Err(Violation { field: field.into(), value: value.to_string(), expected: expected.into() })
+}
+
+type Checked = Result<(), Violation>;
+
+/// What the answers to one call are checked against.
+pub(super) struct Rules<'a> {
+    pub classes: &'a ClassTable,
+    pub width: u32,
+    pub height: u32,
+    pub regions: usize,
+}
+
+pub(super) fn ratio(field: &str, value: f64) -> Checked {
+    if (0.0..=1.0).contains(&value) { Ok(()) } else { violation(field, &value, "a number from 0 to 1") }
+}
+
+fn finite(field: &str, values: &[f64]) -> Checked {
+    match values.iter().find(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(value) => violation(field, &value, "a finite number"),
+    }
+}
+
+fn not_negative(field: &str, value: f64) -> Checked {
+    if value.is_finite() && value >= 0.0 { Ok(()) } else { violation(field, &value, "a finite number of at least 0") }
+}
+
+fn point(field: &str, point: GridPoint) -> Checked {
+    finite(field, &<[f64; 3]>::from(point))
+}
+
+pub(super) fn localization(found: &Localization) -> Checked {
+    ratio("score", found.score)?;
+    finite("pose", &<[f64; 6]>::from(found.pose))?;
+    let c = &found.covariance;
+    finite("covariance", c.as_flattened())?;
+    let largest = c.as_flattened().iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    for (row, column) in [(0, 1), (0, 2), (1, 2)] {
+        if (c[row][column] - c[column][row]).abs() > SYMMETRY_TOLERANCE * largest {
+            let value = format!("{} against {}", c[row][column], c[column][row]);
+            return violation(format!("covariance[{row}][{column}]"), &value, "a symmetric matrix");
+        }
+    }
+    (0..3).try_for_each(|axis| not_negative(&format!("covariance[{axis}][{axis}]"), c[axis][axis]))?;
+    if let Some(runner_up) = found.runner_up {
+        not_negative("runner_up.distance_m", runner_up.distance_m)?;
+        ratio("runner_up.score_ratio", runner_up.score_ratio)?;
+    }
+    found.heat.iter().enumerate().try_for_each(|(index, cell)| finite(&format!("heat[{index}]"), cell))
+}
+
+impl Rules<'_> {
+    fn class(&self, field: &str, class: ClassId) -> Checked {
+        match self.classes.get(class) {
+            Some(_) => Ok(()),
+            None => violation(field, &class.0, "a class of the map"),
+        }
+    }
+
+    fn kind(&self, field: &str, class: ClassId, kind: ClassKind) -> Checked {
+        self.class(field, class)?;
+        if self.classes.kind(class) == kind {
+            return Ok(());
+        }
+        let word = if kind == ClassKind::Material { "material" } else { "dynamic" };
+        violation(field, &self.classes.name(class), format!("a class of kind {word}"))
+    }
+
+    pub(super) fn region(&self, index: usize, region: &ChangeRegion) -> Checked {
+        let field = |name: &str| format!("region[{index}].{name}");
+        self.class(&field("class_before"), region.class_before)?;
+        self.class(&field("class_after"), region.class_after)?;
+        let bounds = region.bounds;
+        let inside = bounds.left < bounds.right
+            && bounds.top < bounds.bottom
+            && bounds.right <= self.width
+            && bounds.bottom <= self.height;
+        if !inside {
+            let value = format!("{}…{} × {}…{}", bounds.left, bounds.right, bounds.top, bounds.bottom);
+            return violation(field("bounds"), &value, format!("a box inside {}×{} pixels", self.width, self.height));
+        }
+        let size = bounds.width() as usize * bounds.height() as usize;
+        if region.mask.len() != size {
+            return violation(field("mask"), &format_args!("{} bytes", region.mask.len()), format!("{size} bytes"));
+        }
+        if let Some(value) = region.mask.iter().find(|value| **value > 1) {
+            return violation(field("mask"), &value, "0 or 1");
+        }
+        let pixels = region.mask.iter().map(|value| usize::from(*value)).sum::<usize>();
+        if pixels == 0 || pixels != region.pixels as usize {
+            let expected = format!("the number of ones in the mask, {pixels}, above 0");
+            return violation(field("pixels"), &region.pixels, expected);
+        }
+        Ok(())
+    }
+
+    pub(super) fn proposal(&self, index: usize, proposal: &Proposal) -> Checked {
+        let field = |name: &str| format!("proposal[{index}].{name}");
+        let (Proposal::Place { region, .. } | Proposal::Remove { region, .. } | Proposal::Reject { region, .. }) =
+            proposal;
+        if *region as usize >= self.regions {
+            return violation(field("region"), &region, format!("an index below {}", self.regions));
+        }
+        match proposal {
+            Proposal::Place { descriptor, .. } => self.descriptor(&field("descriptor"), descriptor),
+            Proposal::Remove { class, near, sigma_m, .. } => {
+                self.class(&field("class"), *class)?;
+                point(&field("near"), *near)?;
+                not_negative(&field("sigma_m"), *sigma_m)
+            }
+            Proposal::Reject { rejection, .. } => {
+                self.class(&field("class_before"), rejection.class_before)?;
+                self.class(&field("class_after"), rejection.class_after)?;
+                if rejection.requirement.is_empty() {
+                    return violation(field("requirement"), &"\"\"", "a short name");
+                }
+                finite(&field("measured"), &[rejection.measured])?;
+                finite(&field("limit"), &[rejection.limit])
+            }
+        }
+    }
+
+    fn descriptor(&self, field: &str, descriptor: &Descriptor) -> Checked {
+        match descriptor {
+            Descriptor::Material(material) => {
+                self.kind(&format!("{field}.class"), material.class, ClassKind::Material)?;
+                for (index, corner) in material.corners.into_iter().enumerate() {
+                    point(&format!("{field}.corners[{index}]"), corner)?;
+                }
+                let length = material.normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+                let off = (length - 1.0).abs();
+                if off.is_nan() || off > NORMAL_TOLERANCE {
+                    return violation(
+                        format!("{field}.normal"),
+                        &format_args!("{:?}", material.normal),
+                        "a unit vector",
+                    );
+                }
+            }
+            Descriptor::Dynamic(dynamic) => {
+                self.kind(&format!("{field}.class"), dynamic.class, ClassKind::Dynamic)?;
+                point(&format!("{field}.position"), dynamic.position)?;
+                finite(&format!("{field}.yaw_rad"), dynamic.yaw_rad.as_slice())?;
+                if let Some(size) = dynamic.size_m.iter().find(|size| !(size.is_finite() && **size > 0.0)) {
+                    return violation(format!("{field}.size_m"), &size, "a finite number above 0");
+                }
+            }
+        }
+        let Some(Uncertainty { position_m, size_m, area_m2 }) = descriptor.sigma() else { return Ok(()) };
+        [Some(position_m), size_m, area_m2]
+            .into_iter()
+            .flatten()
+            .try_for_each(|sigma| not_negative(&format!("{field}.sigma"), sigma))
+    }
+}
