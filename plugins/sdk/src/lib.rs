@@ -1,6 +1,18 @@
 //! Safe Rust SDK for resurvey plugins. Implement one of [`Scorer`], [`Searcher`], [`Detector`], [`Estimator`] and export
-//! it with one macro call; the macro writes the unsafe part.
+//! it with one macro call; the macro writes the unsafe part, and `#![forbid(unsafe_code)]` still holds in the plugin.
 
+#[cfg(panic = "abort")]
+compile_error!(
+    "a plugin must unwind: with panic = \"abort\" one panic of the plugin would end the host. Remove it from the profile."
+);
+
+mod abi_host;
+mod borrow;
+mod call;
+mod caught;
+mod deliver;
+#[doc(hidden)]
+pub mod export;
 pub mod host;
 pub mod image;
 pub mod kinds;
