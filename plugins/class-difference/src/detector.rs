@@ -1,0 +1,133 @@
+//! The detector: from photo and view to regions.
+
+use crate::pairs::pair_regions;
+use crate::raster::Rasters;
+use crate::realign::explained;
+use crate::region::{Growth, grow, most_frequent, region, sound_components};
+use crate::removal::{Evidence, removed};
+use crate::settings::{Profile, SCHEMA, Settings};
+use crate::tolerance::tolerance_px;
+use resurvey_plugin::schema::{ChangeRegion, ClassId, ClassKind, ClassTable};
+use resurvey_plugin::{Comparison, Detector, Error, Host, Plugin};
+
+/// Detects changes as differences of class between photo and view.
+pub struct ClassDifference {
+    settings: Settings,
+}
+
+impl Plugin for ClassDifference {
+    const NAME: &'static str = "class-difference";
+    const VERSION: &'static str = env!("CARGO_PKG_VERSION");
+    const SUMMARY: &'static str = "regions in which the photo has another class than the map, beyond the pose error";
+    const SETTINGS: &'static str = SCHEMA;
+    type Settings = Settings;
+
+    fn create(settings: Settings) -> Result<Self, Error> {
+        Ok(Self { settings })
+    }
+}
+
+impl Detector for ClassDifference {
+    fn detect(&mut self, host: &dyn Host, comparison: &Comparison<'_>) -> Result<Vec<ChangeRegion>, Error> {
+        let rasters = Rasters::new(comparison)?;
+        match self.settings.profile {
+            Profile::Paper => Ok(pair_regions(&rasters, host.classes())),
+            Profile::Default => self.regions(host, comparison, &rasters),
+        }
+    }
+}
+
+impl ClassDifference {
+    fn regions(
+        &self,
+        host: &dyn Host,
+        comparison: &Comparison<'_>,
+        rasters: &Rasters,
+    ) -> Result<Vec<ChangeRegion>, Error> {
+        let settings = &self.settings;
+        let classes = host.classes();
+        let tolerance_px = tolerance_px(comparison, rasters, settings);
+        let shows_behind = shows_behind(host, comparison, rasters, &tolerance_px)?;
+        let different = different(rasters, classes);
+        let in_view = explained(&rasters.photo, &rasters.view, &tolerance_px, rasters.width, &different);
+        // What was behind a descriptor that is gone is no new material.
+        let changed: Vec<bool> =
+            (0..different.len()).map(|at| different[at] && !in_view[at] && !shows_behind[at]).collect();
+        let same_descriptor = same_descriptor(rasters, classes);
+        let growth = Growth { changed: &changed, different: &different, same_descriptor: &same_descriptor };
+        let grown = grow(rasters, &tolerance_px, &growth);
+        let limit_px = |class: u8| self.limit_px(classes, class, rasters.photo.len());
+        let added = sound_components(&grown, &changed, rasters.width, settings.min_radius_px, limit_px);
+        let added = added
+            .iter()
+            .map(|pixels| region(rasters, pixels, ClassId(rasters.photo[pixels[0]]), settings.max_hole_share));
+        let evidence = Evidence { rasters, tolerance_px: &tolerance_px, shows_behind: &shows_behind };
+        let gone = removed(&evidence, settings, limit_px);
+        let gone = gone.iter().map(|pixels| {
+            let shown = pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
+            region(rasters, pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
+        });
+        Ok(gone.chain(added).collect())
+    }
+
+    fn limit_px(&self, classes: &ClassTable, class: u8, image_px: usize) -> usize {
+        let share = match classes.kind(ClassId(class)) {
+            ClassKind::Dynamic => self.settings.min_dynamic_share,
+            ClassKind::Material | ClassKind::Ignored => self.settings.min_material_share,
+        };
+        (share * image_px as f64).ceil() as usize
+    }
+}
+
+/// Where photo and view differ and it could mean something: not where the photo is ignored or void, and no material
+/// where the view has nothing to attach it to.
+fn different(rasters: &Rasters, classes: &ClassTable) -> Vec<bool> {
+    let kinds: Vec<ClassKind> = (0..=255).map(|class| classes.kind(ClassId(class))).collect();
+    let differs = |pixel: usize| {
+        let (before, after) = (rasters.view[pixel], rasters.photo[pixel]);
+        before != after
+            && match kinds[usize::from(after)] {
+                ClassKind::Ignored => false,
+                ClassKind::Material => !rasters.is_sky(pixel),
+                ClassKind::Dynamic => true,
+            }
+    };
+    (0..rasters.photo.len()).map(differs).collect()
+}
+
+/// Where the view shows a material descriptor of the class that the photo has there.
+fn same_descriptor(rasters: &Rasters, classes: &ClassTable) -> Vec<bool> {
+    let same = |pixel: usize| {
+        let class = rasters.photo[pixel];
+        rasters.features[pixel] != 0
+            && rasters.view[pixel] == class
+            && classes.kind(ClassId(class)) == ClassKind::Material
+    };
+    (0..rasters.photo.len()).map(same).collect()
+}
+
+/// Where the view shows a descriptor and the photo what the map has behind it, within the tolerance.
+fn shows_behind(
+    host: &dyn Host,
+    comparison: &Comparison<'_>,
+    rasters: &Rasters,
+    tolerance_px: &[u8],
+) -> Result<Vec<bool>, Error> {
+    let void = ClassId::VOID.0;
+    let asked: Vec<bool> = (0..rasters.photo.len())
+        .map(|at| {
+            let class = rasters.photo[at];
+            rasters.features[at] != 0 && class != void && class != rasters.view[at]
+        })
+        .collect();
+    if !asked.contains(&true) {
+        return Ok(asked);
+    }
+    let behind = host.render(1, false, &[comparison.estimate.pose])?;
+    let labels = behind.into_iter().next().map(|view| view.labels).unwrap_or_default();
+    if labels.len() != rasters.photo.len() {
+        let (expected, found) = (rasters.photo.len(), labels.len());
+        return Err(Error(format!("expected a rendering of {expected} pixels from the host, found {found}")));
+    }
+    Ok(explained(&rasters.photo, &labels, tolerance_px, rasters.width, &asked))
+}

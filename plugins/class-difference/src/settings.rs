@@ -1,0 +1,62 @@
+//! What a user can set.
+
+use serde::Deserialize;
+
+/// JSON schema of [`Settings`].
+pub const SCHEMA: &str = r#"{
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "type": "object",
+  "additionalProperties": false,
+  "properties": {
+    "profile": { "type": "string", "enum": ["default", "paper"], "default": "default",
+      "description": "default, or paper: Eq. 8 alone, 5 % of the image for every region" },
+    "min_material_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.002,
+      "description": "smallest region of a material class, share of the image" },
+    "min_dynamic_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.001,
+      "description": "smallest region of a dynamic class, share of the image" },
+    "tolerance_sigmas": { "type": "number", "minimum": 0, "maximum": 10, "default": 2.0,
+      "description": "how many standard deviations of the pose are tolerated" },
+    "label_jitter_px": { "type": "number", "minimum": 0, "maximum": 50, "default": 4.0,
+      "description": "how far contours of the photo's labels wander, px" },
+    "map_tolerance_m": { "type": "number", "minimum": 0, "maximum": 5, "default": 0.25,
+      "description": "how far walls of the map are off, m" },
+    "max_tolerance_px": { "type": "integer", "minimum": 0, "maximum": 200, "default": 32,
+      "description": "upper bound of all tolerances together, px" },
+    "min_radius_px": { "type": "number", "minimum": 0, "maximum": 200, "default": 4.0,
+      "description": "radius of the largest disk inside a region, at least, px" },
+    "max_hole_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.1,
+      "description": "largest hole that is filled, share of its region" },
+    "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.5,
+      "description": "a descriptor is still there when the photo shows its class on this share of its pixels" },
+    "removal_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.7,
+      "description": "a descriptor is gone when the photo shows what is behind on this share of its pixels" }
+  }
+}"#;
+
+/// Whether to follow the paper to the letter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Profile {
+    /// All that this plugin knows.
+    Default,
+    /// Eq. 8 and the paper's size limit.
+    Paper,
+}
+
+/// The settings; [`SCHEMA`] says what each means.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Settings {
+    pub profile: Profile,
+    pub min_material_share: f64,
+    pub min_dynamic_share: f64,
+    pub tolerance_sigmas: f64,
+    pub label_jitter_px: f64,
+    pub map_tolerance_m: f64,
+    pub max_tolerance_px: u8,
+    pub min_radius_px: f64,
+    pub max_hole_share: f64,
+    pub still_share: f64,
+    pub removal_share: f64,
+}
