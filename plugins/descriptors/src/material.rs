@@ -1,0 +1,261 @@
+//! Material descriptors: the corners of a rectangle on a wall (Lee & Hsu, Eq. 15, Alg. 1), with every requirement of
+//! Alg. 1 as a measured value beside its limit.
+
+use crate::edges::is_true_edge;
+use crate::outline::Outline;
+use crate::plane::Plane;
+use crate::quad::{self, CORRELATION_PX, Quad};
+use crate::rectangle::{self, Corners};
+use crate::requirement::{Stop, Unmet, at_least, at_most};
+use crate::sight::Sight;
+use crate::spread::{Nudge, nudges};
+use crate::window::{Window, rays};
+use nalgebra::{Vector2, Vector3};
+use resurvey_plugin::schema::{ChangeRegion, ClassKind, MaterialDescriptor, Uncertainty};
+
+/// Points to which a plane is fitted, at most.
+const PLANE_POINTS: usize = 1500;
+/// Pixels at which the fill is sampled, about.
+const FILL_SAMPLES: f64 = 5000.0;
+/// Share of the contour that may be hidden and still count as seen whole: label noise does that much.
+const HIDDEN_NOISE: f64 = 0.1;
+/// Requirements on shape widen with what label noise alone would cause, at most to this multiple.
+const MAX_WIDENING: f64 = 2.0;
+
+/// What one region is measured with.
+struct Measurement<'a> {
+    sight: &'a Sight<'a>,
+    region: &'a ChangeRegion,
+    outline: &'a Outline,
+    window: Window,
+    quad: Quad,
+    plane: Plane,
+}
+
+/// 1σ of what is measured, from label noise alone (`shape`) and with the pose.
+#[derive(Default)]
+struct Variance {
+    side_difference: f64,
+    angle_deg: f64,
+    tilt_rad: f64,
+    centre_m2: f64,
+    size_m2: f64,
+    area_m4: f64,
+}
+
+/// The material descriptor of `region`.
+pub fn measure(sight: &Sight<'_>, region: &ChangeRegion, outline: &Outline) -> Result<MaterialDescriptor, Stop> {
+    let [width, height] = sight.size();
+    at_most("captured-entirely", outline.border_pixels(width, height) as f64, 0.0, "px")?;
+    let bounds = outline.bounds;
+    let middle = |start: u32, end: u32| (f64::from(start) + f64::from(end)) / 2.0;
+    let centre = Vector2::new(middle(bounds.left, bounds.right), middle(bounds.top, bounds.bottom));
+    let shapeless = Unmet { requirement: "rectangle", measured: 0.0, limit: 4.0, unit: "sides" };
+    let window = Window::new(sight.host, sight.pose(), centre)?.ok_or(shapeless)?;
+    let (edge, hidden_share) = contour(sight, region, outline, &window)?;
+    if !sight.settings.allow_partly_hidden {
+        at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
+    }
+    let quad = quad::fit(&edge).ok_or(shapeless)?;
+    let seen = quad.visible.iter().copied().fold(1.0, f64::min);
+    let min_seen = sight.settings.min_side_visible;
+    if hidden_share > HIDDEN_NOISE {
+        at_most("captured-entirely", 1.0 - seen, 1.0 - min_seen, "ratio")?;
+    }
+    at_least("rectangle", seen, min_seen, "ratio")?;
+    let plane = wall(sight, outline)?;
+    Measurement { sight, region, outline, window, quad, plane }.descriptor()
+}
+
+/// True edges of the contour in the window, and the share of the contour that is none.
+fn contour(
+    sight: &Sight<'_>,
+    region: &ChangeRegion,
+    outline: &Outline,
+    window: &Window,
+) -> Result<(Vec<Vector2<f64>>, f64), Stop> {
+    let contour = outline.contour();
+    let edge: Vec<[f64; 2]> = contour
+        .iter()
+        .filter(|point| is_true_edge(sight, outline, point, region.class_after))
+        .map(|point| point.at.into())
+        .collect();
+    let hidden_share = 1.0 - edge.len() as f64 / contour.len().max(1) as f64;
+    let rays = rays(sight.host, sight.pose(), &edge)?;
+    Ok((rays.iter().filter_map(|ray| window.pixel(ray)).collect(), hidden_share))
+}
+
+/// The plane of the surface behind the region.
+fn wall(sight: &Sight<'_>, outline: &Outline) -> Result<Plane, Stop> {
+    let pixels: Vec<[u32; 2]> = outline.pixels().collect();
+    let step = pixels.len().div_ceil(PLANE_POINTS).max(1);
+    let sampled = pixels.iter().step_by(step);
+    let points: Vec<Vector3<f64>> =
+        sampled.clone().filter_map(|[u, v]| sight.point(i64::from(*u), i64::from(*v))).collect();
+    let share = points.len() as f64 / sampled.count().max(1) as f64;
+    let settings = sight.settings;
+    at_least("on-a-surface", share, settings.plane_point_share, "ratio")?;
+    let reach = |axis: usize| {
+        let along = |pick: fn(f64, f64) -> f64, start| points.iter().map(|p| p[axis]).fold(start, pick);
+        along(f64::max, f64::NEG_INFINITY) - along(f64::min, f64::INFINITY)
+    };
+    let diagonal_m = Vector3::new(reach(0), reach(1), reach(2)).norm();
+    let limit_m = settings.max_plane_distance_m.max(settings.max_plane_distance_share * diagonal_m);
+    let no_plane = Unmet { requirement: "coplanar", measured: 0.0, limit: 3.0, unit: "points" };
+    let plane = Plane::through(&points, limit_m / 2.0).ok_or(no_plane)?;
+    let mut distances_m: Vec<f64> = points.iter().map(|point| plane.distance_m(point).abs()).collect();
+    distances_m.sort_by(f64::total_cmp);
+    let last = distances_m.len() - 1;
+    let measured_m = distances_m[((last as f64 * settings.plane_point_share).ceil() as usize).min(last)];
+    at_most("coplanar", measured_m, limit_m, "m")?;
+    Ok(plane)
+}
+
+impl Measurement<'_> {
+    fn descriptor(&self) -> Result<MaterialDescriptor, Stop> {
+        let settings = self.sight.settings;
+        let at_infinity =
+            Unmet { requirement: "within-range", measured: f64::MAX, limit: settings.max_range_m, unit: "m" };
+        let corners = self.corners(&self.quad.corners, &Nudge::none()).ok_or(at_infinity)?;
+        let range_m = corners.iter().map(|corner| self.plane.at(corner).norm()).fold(0.0, f64::max);
+        at_most("within-range", range_m, settings.max_range_m, "m")?;
+        let mut variance = Variance::default();
+        self.shake_sides(&corners, &mut variance);
+        self.is_rectangle(&corners, &variance)?;
+        self.fills()?;
+        for nudge in
+            nudges(&self.sight.comparison.estimate).ok_or(uncertain(f64::MAX, settings.max_position_sigma_m))?
+        {
+            variance.add(&corners, self.corners(&self.quad.corners, &nudge).as_ref());
+        }
+        let corners = self.meant(&corners, &variance);
+        let sigma = Uncertainty {
+            position_m: variance.centre_m2.sqrt(),
+            size_m: Some(variance.size_m2.sqrt()),
+            area_m2: Some(variance.area_m4.sqrt()),
+        };
+        let points = corners.map(|corner| self.plane.at(&corner));
+        at_most("uncertain", sigma.position_m, settings.max_position_sigma_m, "m")?;
+        let area_share = variance.area_m4.sqrt() / rectangle::quad_area_m2(points);
+        at_most("uncertain", area_share, settings.max_area_sigma_share, "ratio")?;
+        Ok(MaterialDescriptor {
+            class: self.region.class_after,
+            corners: points.map(|point| self.sight.to_grid(&point)),
+            normal: self.plane.normal.into(),
+            sigma: Some(sigma),
+        })
+    }
+
+    /// Corners on the wall of `pixels` in the window, seen from a moved pose.
+    fn corners(&self, pixels: &[Vector2<f64>; 4], nudge: &Nudge) -> Option<Corners> {
+        let corner = |pixel: &Vector2<f64>| {
+            let point = self.plane.meet(&nudge.offset, &(nudge.turn * self.window.ray(pixel)))?;
+            Some(self.plane.coordinates(&point))
+        };
+        let [a, b, c, d] = pixels;
+        Some(rectangle::in_order([corner(a)?, corner(b)?, corner(c)?, corner(d)?]))
+    }
+
+    /// Adds what wandering contours do: a side of the length over which they wander together is off by 1σ of the
+    /// labels' jitter, a longer one by less.
+    fn shake_sides(&self, corners: &Corners, variance: &mut Variance) {
+        for side in 0..4 {
+            let length_px = self.quad.length_px(side);
+            let independent = (length_px / CORRELATION_PX).max(1.0).sqrt();
+            let sigma_px = self.quad.sides[side].rms_px.max(self.sight.settings.label_jitter_px) / independent;
+            let turn_rad = 12f64.sqrt() * sigma_px / length_px.max(1.0);
+            for (shift_px, turn_rad) in [(sigma_px, 0.0), (0.0, turn_rad)] {
+                let shaken = self.quad.shaken(side, shift_px, turn_rad);
+                variance.add(corners, shaken.and_then(|pixels| self.corners(&pixels, &Nudge::none())).as_ref());
+            }
+        }
+    }
+
+    fn is_rectangle(&self, corners: &Corners, variance: &Variance) -> Result<(), Unmet> {
+        let settings = self.sight.settings;
+        let widened = |limit: f64, variance: f64| (limit + variance.sqrt()).min(MAX_WIDENING * limit);
+        let limit = widened(settings.max_side_difference, variance.side_difference);
+        at_most("rectangle", rectangle::side_difference(corners), limit, "ratio")?;
+        let limit_deg = widened(settings.max_angle_difference_deg, variance.angle_deg);
+        at_most("rectangle", rectangle::angle_difference_deg(corners), limit_deg, "deg")
+    }
+
+    /// Requires that the region fills the quadrilateral, what something nearer hides aside, and does not reach beyond.
+    fn fills(&self) -> Result<(), Stop> {
+        let bounds = self.outline.bounds;
+        let margin = |size: u32| i64::from(size / 4 + 4);
+        let across = i64::from(bounds.left) - margin(bounds.width())..i64::from(bounds.right) + margin(bounds.width());
+        let down = i64::from(bounds.top) - margin(bounds.height())..i64::from(bounds.bottom) + margin(bounds.height());
+        let area = (across.end - across.start) as f64 * (down.end - down.start) as f64;
+        let step = (area / FILL_SAMPLES).sqrt().ceil().max(1.0) as usize;
+        let pixels: Vec<[i64; 2]> = down
+            .step_by(step)
+            .flat_map(|v| across.clone().step_by(step).map(move |u| [u, v]))
+            .filter(|[u, v]| self.sight.photo(*u, *v).is_some())
+            .collect();
+        let centres: Vec<[f64; 2]> = pixels.iter().map(|pixel| pixel.map(|x| x as f64 + 0.5)).collect();
+        let [mut filled, mut empty, mut hidden, mut beyond] = [0.0; 4];
+        for ([u, v], ray) in pixels.iter().zip(rays(self.sight.host, self.sight.pose(), &centres)?) {
+            let in_quad = self.window.pixel(&ray).is_some_and(|pixel| self.quad.contains(&pixel));
+            let photo = self.sight.photo(*u, *v);
+            match (in_quad, self.outline.contains(*u, *v)) {
+                (true, true) => filled += 1.0,
+                (false, true) => beyond += 1.0,
+                (true, false) if photo == Some(self.region.class_after) => filled += 1.0,
+                (true, false) if self.may_hide(*u, *v) => hidden += 1.0,
+                (true, false) => empty += 1.0,
+                (false, false) => {}
+            }
+        }
+        let settings = self.sight.settings;
+        let share = |part: f64, rest: f64| part / f64::max(part + rest, 1.0);
+        at_most("captured-entirely", share(hidden, filled + empty), 1.0 - settings.min_side_visible, "ratio")?;
+        at_least("rectangle", share(filled, empty).min(share(filled, beyond)), settings.min_fill, "ratio")?;
+        Ok(())
+    }
+
+    fn may_hide(&self, u: i64, v: i64) -> bool {
+        let (photo, view) = (self.sight.photo(u, v), self.sight.view(u, v));
+        let in_front = photo.is_some_and(|class| self.sight.host.classes().kind(class) != ClassKind::Material);
+        self.sight.settings.allow_partly_hidden && in_front && photo != view && photo != self.sight.sky
+    }
+
+    /// The rectangle that the quadrilateral is meant to be. Banners hang level: what is within the tolerance of level,
+    /// and of what label noise does, is.
+    fn meant(&self, corners: &Corners, variance: &Variance) -> Corners {
+        let settings = self.sight.settings;
+        if !settings.regularise {
+            return *corners;
+        }
+        let tilt_rad = rectangle::tilt_rad(corners);
+        let tolerance_rad = settings.max_level_angle_deg.to_radians();
+        let tolerance_rad = (tolerance_rad + variance.tilt_rad.sqrt()).min(MAX_WIDENING * tolerance_rad);
+        let is_level = self.plane.is_upright() && tilt_rad.abs() <= tolerance_rad;
+        rectangle::regular(corners, if is_level { 0.0 } else { tilt_rad })
+    }
+}
+
+fn uncertain(measured: f64, limit: f64) -> Unmet {
+    Unmet { requirement: "uncertain", measured, limit, unit: "m" }
+}
+
+impl Variance {
+    /// Adds the squares of what moving a corner changes; nothing left to measure is an infinite change.
+    fn add(&mut self, corners: &Corners, moved: Option<&Corners>) {
+        let Some(moved) = moved else {
+            self.centre_m2 = f64::INFINITY;
+            self.area_m4 = f64::INFINITY;
+            return;
+        };
+        let change = |of: fn(&Corners) -> f64| (of(moved) - of(corners)).powi(2);
+        let area = |corners: &Corners| (corners[2] - corners[0]).perp(&(corners[3] - corners[1])) / 2.0;
+        let centre = |corners: &Corners| corners.iter().sum::<Vector2<f64>>() / 4.0;
+        self.side_difference += change(rectangle::side_difference);
+        self.angle_deg += change(rectangle::angle_difference_deg);
+        self.tilt_rad += change(rectangle::tilt_rad);
+        self.centre_m2 += (centre(moved) - centre(corners)).norm_squared();
+        let ([w, h], [moved_w, moved_h]) = (rectangle::size_m(corners), rectangle::size_m(moved));
+        self.size_m2 += ((moved_w - w).powi(2)).max((moved_h - h).powi(2));
+        self.area_m4 += (area(moved) - area(corners)).powi(2);
+    }
+}
