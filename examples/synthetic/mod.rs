@@ -1,0 +1,30 @@
+//! Invented places with known truth: segmented models, captures of them, and what was changed. Everything follows from
+//! a seed. Photos are cast ray by ray over the generator's own boxes, never by the product's renderer, so that the truth
+//! stays independent of what it judges. The layout on disk and the meaning of every number are those of the project's
+//! scored captures (`docs/accuracy.md`).
+#![allow(dead_code, unused_imports, reason = "examples, tests and benches each use a part of this module")]
+
+pub mod camera;
+pub mod capture;
+pub mod caster;
+pub mod change;
+pub mod clutter;
+pub mod facade;
+pub mod glb;
+pub mod hall;
+pub mod label_png;
+pub mod model;
+pub mod noise;
+pub mod prior;
+pub mod random;
+pub mod scene;
+pub mod street;
+pub mod suite;
+pub mod three_ds;
+pub mod world;
+
+pub use capture::{Case, CaseSpec, TrueChange, Truth};
+pub use change::ChangeKind;
+pub use noise::NoiseLevel;
+pub use scene::{Scene, SceneKind};
+pub use suite::{Suite, write_case, write_map, write_suite};

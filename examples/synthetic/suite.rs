@@ -1,0 +1,95 @@
+//! Maps and captures on disk, in the layout that `score.py` and `resurvey eval` read.
+
+use super::capture::{Case, CaseSpec};
+use super::change::ChangeKind;
+use super::model::Model;
+use super::noise::NoiseLevel;
+use super::scene::{Scene, SceneKind};
+use super::{glb, label_png, three_ds};
+use anyhow::Context;
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A set of captures of one scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Suite {
+    /// The place.
+    pub scene: SceneKind,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Number of captures.
+    pub count: usize,
+    /// How good labels, prior and map are.
+    pub noise: NoiseLevel,
+    /// The one kind of change; `None` takes all that suit the scene in turn.
+    pub change: Option<ChangeKind>,
+}
+
+impl Suite {
+    /// What each capture of the suite is.
+    pub fn specs(&self, scene: &Scene) -> Vec<CaseSpec> {
+        let kinds = self.change.map_or_else(|| ChangeKind::of(scene), |kind| vec![kind]);
+        (0..self.count)
+            .map(|index| {
+                let change = kinds[index % kinds.len()];
+                let (place, noise) = (scene.name(), self.noise.name);
+                CaseSpec {
+                    name: format!("{place}-{}-{noise}-{index:03}", change.name().replace('_', "-")),
+                    change,
+                    noise: self.noise,
+                    seed: self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
+                    grid_prior: false,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Writes the scene's map under `directory/maps` and returns its directory.
+pub fn write_map(scene: &Scene, directory: &Path) -> anyhow::Result<PathBuf> {
+    let name = scene.name();
+    let folder = directory.join("maps").join(name);
+    fs::create_dir_all(&folder).with_context(|| format!("making {}", folder.display()))?;
+    let model = Model::new(&scene.world)?;
+    write(&folder.join(format!("{name}.3ds")), &three_ds::encode(&model))?;
+    write(&folder.join(format!("{name}.glb")), &glb::encode(&model))?;
+    for material in &model.materials {
+        if let Some(png) = &material.texture {
+            write(&folder.join(three_ds::texture_name(material)), png)?;
+        }
+    }
+    let map = json!({"origin": scene.origin, "triangles": model.triangles()});
+    write(&folder.join("map.json"), map.to_string().as_bytes())?;
+    Ok(folder)
+}
+
+/// Writes one capture under `directory` and returns its directory.
+pub fn write_case(case: &Case, directory: &Path) -> anyhow::Result<PathBuf> {
+    let folder = directory.join(&case.spec.name);
+    fs::create_dir_all(&folder).with_context(|| format!("making {}", folder.display()))?;
+    write(&folder.join("labels.png"), &label_png::encode(&case.labels, case.width)?)?;
+    write(&folder.join("capture.json"), serde_json::to_string_pretty(&case.capture)?.as_bytes())?;
+    write(&folder.join("truth.json"), serde_json::to_string_pretty(&case.truth.json)?.as_bytes())?;
+    if !case.base_changes.is_empty() {
+        let lines: String = case.base_changes.iter().map(|line| format!("{line}\n")).collect();
+        write(&folder.join("base.changes.jsonl"), lines.as_bytes())?;
+    }
+    Ok(folder)
+}
+
+/// Writes the map and all captures of a suite; returns the captures' directories.
+pub fn write_suite(suite: &Suite, directory: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let scene = Scene::new(suite.scene, suite.seed);
+    write_map(&scene, directory)?;
+    suite.specs(&scene).into_iter().map(|spec| write_case(&Case::new(&scene, spec)?, directory)).collect()
+}
+
+/// Latitude and longitude of a grid position with a height above HKPD.
+pub fn wgs84(_easting: f64, _northing: f64, _height: f64) -> anyhow::Result<Option<[f64; 2]>> {
+    Ok(None)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    fs::write(path, bytes).with_context(|| format!("writing {}", path.display()))
+}
