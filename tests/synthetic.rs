@@ -66,7 +66,7 @@ fn a_true_banner_is_where_the_photo_shows_it() {
             assert!((found - expected).abs() < 1.5, "{kind:?} {seed}: found {found} px, expected {expected} px");
         }
     }
-    assert!(checked >= 6, "only {checked} photos show no other banner");
+    assert!(checked >= 5, "only {checked} photos show no other banner");
 }
 
 #[test]
