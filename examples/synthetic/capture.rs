@@ -116,7 +116,7 @@ fn attitude_deg(event: &Event) -> [f64; 3] {
 fn capture(scene: &Scene, spec: &CaseSpec, event: &Event, error: &PriorError) -> anyhow::Result<CaptureFile> {
     let camera = &event.camera;
     let [easting, northing, height] = [0, 1, 2].map(|i| scene.origin[i] + camera.position[i] + error.offset_m[i]);
-    let wgs84 = if spec.grid_prior { None } else { super::suite::wgs84(easting, northing, height)? };
+    let wgs84 = if spec.grid_prior { None } else { Some(super::suite::wgs84([easting, northing, height])?) };
     let [yaw, pitch, roll] = attitude_deg(event);
     Ok(CaptureFile {
         format: FORMAT.to_owned(),

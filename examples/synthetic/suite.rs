@@ -7,6 +7,7 @@ use super::noise::NoiseLevel;
 use super::scene::{Scene, SceneKind};
 use super::{glb, label_png, three_ds};
 use anyhow::Context;
+use resurvey_core::crs::{Crs, GridPoint};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -85,9 +86,10 @@ pub fn write_suite(suite: &Suite, directory: &Path) -> anyhow::Result<Vec<PathBu
     suite.specs(&scene).into_iter().map(|spec| write_case(&Case::new(&scene, spec)?, directory)).collect()
 }
 
-/// Latitude and longitude of a grid position with a height above HKPD.
-pub fn wgs84(_easting: f64, _northing: f64, _height: f64) -> anyhow::Result<Option<[f64; 2]>> {
-    Ok(None)
+/// Latitude and longitude, degrees, of a grid position with a height above HKPD.
+pub fn wgs84([easting, northing, height]: [f64; 3]) -> anyhow::Result<[f64; 2]> {
+    let wgs84 = Crs::Hk1980.wgs84_from_grid(GridPoint::new(easting, northing, height))?;
+    Ok([wgs84.latitude_deg, wgs84.longitude_deg])
 }
 
 fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
