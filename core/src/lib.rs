@@ -3,6 +3,7 @@
 #![deny(unsafe_code)]
 
 pub mod camera;
+pub mod capture;
 pub mod crs;
 pub mod export;
 pub mod image;

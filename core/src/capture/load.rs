@@ -38,8 +38,8 @@ impl Capture {
             let reason = format!("format is {:?}; expected {FORMAT:?}", file.format);
             return Err(CaptureError::Form { path: path.to_owned(), reason });
         }
-        let camera = Camera::from_file(&file.camera)
-            .map_err(|source| CaptureError::Camera { path: path.to_owned(), source })?;
+        let camera =
+            Camera::from_file(&file.camera).map_err(|source| CaptureError::Camera { path: path.to_owned(), source })?;
         let prior = prior_from_file(&file.prior, crs, path)?;
         let taken_at = file.taken_at.as_deref().map(|time| parse_time(time, path)).transpose()?;
         let label_path = path.parent().unwrap_or(Path::new("")).join(&file.labels);
@@ -51,7 +51,7 @@ impl Capture {
         if found != expected {
             return Err(CaptureError::Size { labels: label_path, capture: path.to_owned(), found, expected });
         }
-        let digest = Digest::of(&[Digest::of(&text).as_bytes().as_slice(), Digest::of(&label_bytes).as_bytes()].concat());
+        let digest = Digest::of(&[Digest::of(&text).0, Digest::of(&label_bytes).0].concat());
         Ok(Self { labels, label_bytes, camera, prior, taken_at, digest })
     }
 }

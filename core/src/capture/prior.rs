@@ -110,7 +110,11 @@ impl Check<'_> {
 
     /// `value` if it is finite and at most `limit` from zero.
     fn within(&self, key: &'static str, value: f64, limit: f64, expected: &'static str) -> Result<f64, CaptureError> {
-        if value.is_finite() && value.abs() <= limit { Ok(value) } else { Err(self.value(key, value.to_string(), expected)) }
+        if value.is_finite() && value.abs() <= limit {
+            Ok(value)
+        } else {
+            Err(self.value(key, value.to_string(), expected))
+        }
     }
 
     fn sigma(&self, key: &'static str, value: Option<f64>, default: f64) -> Result<f64, CaptureError> {
@@ -181,7 +185,8 @@ mod tests {
 
     #[test]
     fn magnetic_north_needs_a_declination_and_true_north_the_convergence() {
-        let north = |north: &str, declination_deg| PriorFile { north: Some(north.to_owned()), declination_deg, ..file() };
+        let north =
+            |north: &str, declination_deg| PriorFile { north: Some(north.to_owned()), declination_deg, ..file() };
         assert!(read(&north("magnetic", None)).is_err());
         assert!(read(&north("up", None)).is_err());
         let grid = read(&north("grid", None)).unwrap();

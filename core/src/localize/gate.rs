@@ -118,7 +118,8 @@ mod tests {
 
     #[test]
     fn the_worst_direction_counts_not_an_axis() {
-        let stretched = Localization { covariance: [[0.8, 0.7, 0.0], [0.7, 0.8, 0.0], [0.0, 0.0, 1e-4]], ..localization() };
+        let stretched =
+            Localization { covariance: [[0.8, 0.7, 0.0], [0.7, 0.8, 0.0], [0.0, 0.0, 1e-4]], ..localization() };
         // Eigenvalue 1.5 m² along the diagonal, though both axes are below 1 m².
         assert_eq!(failed(&stretched), ["position-sigma is 1.22 m; the limit is 1 m"]);
     }

@@ -1,4 +1,15 @@
-//! Where the phone stood: the host-driven search, the reliability gate and the heat map.
+//! Where the phone stood: the services that matchers use, the host-driven search, the reliability gate and the heat map.
 
-pub mod compare;
-pub mod sweep;
+mod compare;
+mod gate;
+mod locate;
+mod search;
+mod services;
+mod sweep;
+mod world;
+
+pub use gate::{GATE_KEYS, GateLimits};
+pub use locate::{Located, localize};
+pub use search::SearchLimits;
+pub use services::{Listener, SceneServices, Silent};
+pub use world::World;

@@ -6,11 +6,11 @@ use crate::camera::{Camera, camera_from_world, world_from_camera};
 use crate::capture::Capture;
 use crate::crs::Crs;
 use crate::plugin::{ServiceError, Services, ViewImages, class_slots};
-use crate::render::view;
+use crate::render::{RayCaster, SolidMask, view};
 use nalgebra::Vector3;
 use resurvey_schema::service::{ClassCounts, CompareRequest, Level, PanoramaRequest, RayHit};
 use resurvey_schema::{ClassTable, Descriptor, GridPoint, Pose, Wgs84};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Where a run's messages go and whether it should end; the command line fills it in.
 pub trait Listener: Sync {
@@ -41,13 +41,41 @@ pub struct SceneServices<'a> {
     listener: &'a dyn Listener,
     view_photos: Mutex<Vec<(CompareRequest, Arc<ViewPhoto>)>>,
     position_photos: Mutex<Vec<(PanoramaRequest, Arc<PositionPhoto>)>>,
+    solids: Mutex<Vec<(u64, Arc<SolidMask>)>>,
+    rays: OnceLock<RayCaster<'a>>,
+    base_rays: OnceLock<RayCaster<'a>>,
 }
 
 impl<'a> SceneServices<'a> {
     /// Services on `world`, whose grid is `crs`, for `capture`.
     pub fn new(world: &'a World, capture: &'a Capture, crs: Crs, listener: &'a dyn Listener) -> Self {
-        let (view_photos, position_photos) = (Mutex::default(), Mutex::default());
-        Self { world, capture, crs, listener, view_photos, position_photos }
+        Self {
+            world,
+            capture,
+            crs,
+            listener,
+            view_photos: Mutex::default(),
+            position_photos: Mutex::default(),
+            solids: Mutex::default(),
+            rays: OnceLock::new(),
+            base_rays: OnceLock::new(),
+        }
+    }
+
+    /// The capture that the services are about.
+    pub fn capture(&self) -> &'a Capture {
+        self.capture
+    }
+
+    /// The world that they look into.
+    pub fn world(&self) -> &'a World {
+        self.world
+    }
+
+    /// Rays into the map with or without its descriptors, prepared when first asked for.
+    fn rays(&self, with_descriptors: bool) -> &RayCaster<'a> {
+        let rays = if with_descriptors { &self.rays } else { &self.base_rays };
+        rays.get_or_init(|| RayCaster::new(self.world.scene(with_descriptors)))
     }
 
     fn classes_count(&self) -> usize {
@@ -163,7 +191,13 @@ impl Services for SceneServices<'_> {
 
     fn inside_solid(&self, positions: &[GridPoint]) -> Result<Vec<bool>, ServiceError> {
         finite_points(positions)?;
-        Ok(self.world.solids().contain(positions))
+        let inside = |position: &GridPoint| {
+            let solids = prepared(&self.solids, &position.height_m.to_bits(), || {
+                SolidMask::at_height(self.world.scene(false), position.height_m)
+            });
+            solids.contains(*position)
+        };
+        Ok(positions.iter().map(inside).collect())
     }
 
     fn pixel_rays(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Result<Vec<[f64; 3]>, ServiceError> {
@@ -204,7 +238,7 @@ impl Services for SceneServices<'_> {
         finite_points(&[origin])?;
         finite("direction", directions.iter().flatten().copied())?;
         let scene = self.world.scene(with_descriptors);
-        let rays = self.world.rays(with_descriptors);
+        let rays = self.rays(with_descriptors);
         let fid = |feature: u32| {
             let index = (feature as usize).checked_sub(1)?;
             scene.feature_table().get(index).map(|feature| feature.fid)
@@ -219,16 +253,15 @@ impl Services for SceneServices<'_> {
 
     fn descriptors_near(&self, point: GridPoint, radius_m: f64) -> Result<Vec<(u64, Descriptor)>, ServiceError> {
         finite_points(&[point])?;
-        let near = |anchor: GridPoint| {
-            anchor.plan_distance_m(&point).hypot(anchor.height_m - point.height_m) <= radius_m
-        };
+        let near =
+            |anchor: GridPoint| anchor.plan_distance_m(&point).hypot(anchor.height_m - point.height_m) <= radius_m;
         let found = self.world.descriptors().iter().filter(|(_, descriptor)| near(descriptor.anchor()));
         Ok(found.cloned().collect())
     }
 
     fn ground_height(&self, point: GridPoint) -> Result<Option<f64>, ServiceError> {
         finite_points(&[point])?;
-        Ok(self.world.rays(false).ground_below(point).map(|hit| hit.point.height_m))
+        Ok(self.rays(false).ground_below(point).map(|hit| hit.point.height_m))
     }
 
     fn grid_from_wgs84(&self, position: Wgs84) -> Result<GridPoint, ServiceError> {

@@ -1,19 +1,15 @@
 //! The part of a map's version around a capture, ready to be seen: with and without its descriptors.
 
 use crate::mesh::Object;
-use crate::render::{RayCaster, Scene, Solids};
+use crate::render::Scene;
 use resurvey_schema::{ClassTable, Descriptor, GridPoint};
-use std::sync::OnceLock;
 
-/// A version of the map around a place. Rays and buildings are prepared when first asked for.
+/// A version of the map around a place.
 pub struct World {
     classes: ClassTable,
     descriptors: Vec<(u64, Descriptor)>,
     scene: Scene,
     base: Scene,
-    rays: OnceLock<RayCaster>,
-    base_rays: OnceLock<RayCaster>,
-    solids: OnceLock<Solids>,
 }
 
 impl World {
@@ -29,9 +25,6 @@ impl World {
             base: Scene::new(origin, objects, &[], &classes),
             classes,
             descriptors,
-            rays: OnceLock::new(),
-            base_rays: OnceLock::new(),
-            solids: OnceLock::new(),
         }
     }
 
@@ -48,16 +41,5 @@ impl World {
     /// The map with or without its descriptors.
     pub fn scene(&self, with_descriptors: bool) -> &Scene {
         if with_descriptors { &self.scene } else { &self.base }
-    }
-
-    /// Rays into the map with or without its descriptors.
-    pub fn rays(&self, with_descriptors: bool) -> &RayCaster {
-        let (rays, scene) = if with_descriptors { (&self.rays, &self.scene) } else { (&self.base_rays, &self.base) };
-        rays.get_or_init(|| RayCaster::new(scene))
-    }
-
-    /// What is inside a building.
-    pub fn solids(&self) -> &Solids {
-        self.solids.get_or_init(|| Solids::new(&self.base))
     }
 }

@@ -60,12 +60,12 @@ pub fn resolve(proposals: Vec<Proposal>, regions: &[ChangeRegion], descriptors: 
         match proposal {
             Proposal::Place { region, descriptor } => resolver.place(region, descriptor),
             Proposal::Remove { region, class, near, sigma_m } => {
-                removals.push(Removal { region, class, near, sigma_m })
+                removals.push(Removal { region, class, near, sigma_m });
             }
             Proposal::Reject { rejection, .. } => resolver.resolution.rejections.push(rejection),
         }
     }
-    resolver.remove(removals);
+    resolver.remove(&removals);
     resolver.resolution
 }
 
@@ -113,7 +113,7 @@ impl Resolver<'_> {
     }
 
     /// Nearest pairs first, one removal to one descriptor.
-    fn remove(&mut self, removals: Vec<Removal>) {
+    fn remove(&mut self, removals: &[Removal]) {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (index, removal) in removals.iter().enumerate() {
             let reach_m = reach_m(removal);

@@ -1,0 +1,51 @@
+//! One capture, one matcher, one answer with its doubt.
+
+use super::gate::{GateLimits, reason};
+use super::search::{SearchLimits, search};
+use super::services::SceneServices;
+use crate::plugin::{Matcher, MatcherForm, PhotoInput, PluginError, Services};
+use crate::version::Gate;
+use resurvey_schema::Localization;
+
+/// A localization and whether it may change the map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Located {
+    /// The matcher's answer.
+    pub localization: Localization,
+    /// What the reliability gate measured.
+    pub gates: Vec<Gate>,
+    /// Why the pose is not reliable; empty when it is.
+    pub reasons: Vec<String>,
+}
+
+impl Located {
+    /// `localization` as the gate with `limits` sees it.
+    pub fn new(localization: Localization, limits: &GateLimits) -> Self {
+        let gates = limits.measure(&localization);
+        let reasons = gates.iter().filter_map(|gate| reason(gate, &localization)).collect();
+        Self { localization, gates, reasons }
+    }
+
+    /// Whether every gate passed.
+    pub fn is_reliable(&self) -> bool {
+        self.reasons.is_empty()
+    }
+}
+
+/// The pose of the capture that `services` are about, by `matcher` in either form.
+pub fn localize(
+    matcher: &mut Matcher,
+    services: &SceneServices<'_>,
+    limits: &GateLimits,
+    search_limits: &SearchLimits,
+) -> Result<Located, PluginError> {
+    let capture = services.capture();
+    let camera = capture.camera.intrinsics();
+    let photo = PhotoInput { labels: &capture.labels, camera: &camera, prior: &capture.prior };
+    let localization = match matcher.form() {
+        MatcherForm::Search => matcher.search(services, &photo)?,
+        MatcherForm::Score => search(matcher, services, search_limits)?,
+    };
+    services.progress(1.0);
+    Ok(Located::new(localization, limits))
+}
