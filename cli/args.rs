@@ -12,12 +12,22 @@ pub struct Cli {
     /// Print one JSON document instead of text
     #[arg(long, global = true)]
     pub json: bool,
-    /// Directory with plugin libraries, searched before the built-in plugins; may be given again
-    #[arg(long, global = true, value_name = "DIR")]
-    pub plugin_dir: Vec<PathBuf>,
+    #[command(flatten)]
+    pub plugins: PluginSearch,
     /// What to do
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// Where plugins beside the built-in ones come from.
+#[derive(Debug, Args)]
+pub struct PluginSearch {
+    /// Directory with plugin libraries, beside RESURVEY_PLUGIN_PATH and the user's data directory; may be given again
+    #[arg(long, global = true, value_name = "DIR")]
+    pub plugin_dir: Vec<PathBuf>,
+    /// SHA-256 of a plugin library that may be loaded, as "plugins list --verbose" prints it; may be given again
+    #[arg(long, global = true, value_name = "SHA256")]
+    pub allow_plugin: Vec<String>,
 }
 
 /// The commands.

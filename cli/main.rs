@@ -1,2 +1,15 @@
-//! The resurvey command line.
-fn main() {}
+//! The `resurvey` binary.
+#![forbid(unsafe_code)]
+
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let mut out = std::io::BufWriter::new(std::io::stdout());
+    let mut err = std::io::stderr();
+    let shows_progress = err.is_terminal();
+    let code = resurvey::run_with_progress(std::env::args_os(), &mut out, &mut err, shows_progress);
+    // A reader that closed the pipe has what it wanted.
+    let _ = out.flush();
+    ExitCode::from(code)
+}

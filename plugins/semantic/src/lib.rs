@@ -14,6 +14,8 @@ use resurvey_plugin::schema::Localization;
 use resurvey_plugin::{Error, Host, Photo, Plugin, Searcher};
 pub use settings::Settings;
 
+resurvey_plugin::export_searcher!(Semantic);
+
 /// The matcher.
 pub struct Semantic {
     settings: Settings,

@@ -1,0 +1,42 @@
+//! `resurvey apply`.
+
+use crate::args::Apply;
+use crate::console::Console;
+use crate::failure::Failure;
+use jiff::Timestamp;
+use resurvey_core::store::MapFile;
+use resurvey_core::version::read_change_set;
+use serde_json::json;
+use std::io::Read;
+use std::path::Path;
+
+/// Applies a change set whole, or refuses it whole.
+pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open(&options.map)?;
+    let head = map.head()?;
+    let place = options.file.display();
+    let text = read(&options.file).map_err(|error| Failure::input(format!("{place}: {error}")))?;
+    let changes = read_change_set(&text, map.snapshot(head)?.classes())
+        .map_err(|error| Failure::input(format!("{place}: {error}")))?;
+    let version = map.commit(&changes.into_transaction(head), Timestamp::now())?;
+    let counts = map.version(version)?.counts;
+    if console.is_json() {
+        console.document(&json!({
+            "base_version": head.0, "version": version.0,
+            "added": counts.added, "modified": counts.modified, "removed": counts.removed,
+        }))?;
+    } else {
+        let (added, modified, removed) = (counts.added, counts.modified, counts.removed);
+        console.line(format_args!("version {version}: {added} added, {modified} modified, {removed} removed"))?;
+    }
+    Ok(0)
+}
+
+fn read(path: &Path) -> std::io::Result<String> {
+    if path == Path::new("-") {
+        let mut text = String::new();
+        std::io::stdin().read_to_string(&mut text)?;
+        return Ok(text);
+    }
+    std::fs::read_to_string(path)
+}

@@ -1,0 +1,117 @@
+//! `resurvey why`.
+
+use crate::args::Why;
+use crate::commands::localize::pose_text;
+use crate::console::Console;
+use crate::document;
+use crate::failure::Failure;
+use resurvey_core::store::{MapFile, Provenance, RecordedObservation};
+use resurvey_core::version::{Fid, Observation};
+use resurvey_schema::ClassTable;
+use serde_json::{Value, json};
+
+/// The evidence behind a feature, newest step first.
+pub fn run(options: &Why, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open_read_only(&options.map)?;
+    let steps = map.why(Fid(options.fid))?;
+    let snapshot = map.snapshot(map.head()?)?;
+    let classes = snapshot.classes();
+    if console.is_json() {
+        let steps = steps.iter().map(|step| document_of(step, classes)).collect::<Result<Vec<_>, _>>()?;
+        console.document(&json!({ "fid": options.fid, "steps": steps }))?;
+        return Ok(0);
+    }
+    for step in &steps {
+        print(step, classes, console)?;
+    }
+    Ok(0)
+}
+
+fn op(step: &Provenance) -> &'static str {
+    match (step.delta.before(), step.delta.after()) {
+        (None, _) => "add",
+        (_, None) => "remove",
+        _ => "modify",
+    }
+}
+
+fn document_of(step: &Provenance, classes: &ClassTable) -> Result<Value, Failure> {
+    let side = |state: Option<&resurvey_core::version::FeatureState>| {
+        state.map(|state| document::state(state, classes)).transpose()
+    };
+    Ok(json!({
+        "op": op(step),
+        "version": document::version(&step.record),
+        "before": side(step.delta.before())?,
+        "after": side(step.delta.after())?,
+        "observation": step.observation.as_ref().map(|recorded| observation(recorded, classes)),
+    }))
+}
+
+fn observation(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
+    let Observation { capture, taken_at, prior, localization, plugins, gates, rejections, decision, .. } =
+        &recorded.observation;
+    json!({
+        "id": recorded.id,
+        "capture_sha256": capture.to_string(),
+        "taken_at": taken_at.map(|time| time.to_string()),
+        "recorded_at": recorded.recorded_at.to_string(),
+        "labels_sha256": recorded.labels.map(|digest| digest.to_string()),
+        "prior": prior.map(|prior| json!({
+            "pose": prior.pose,
+            "position_sigma_m": prior.position_sigma_m,
+            "height_sigma_m": prior.height_sigma_m,
+            "yaw_sigma_deg": prior.yaw_sigma_rad.to_degrees(),
+            "tilt_sigma_deg": prior.tilt_sigma_rad.to_degrees(),
+        })),
+        "localization": localization.as_ref().map(|found| json!({
+            "pose": found.pose,
+            "score": found.score,
+            "covariance": found.covariance,
+            "runner_up": found.runner_up.map(|other| json!({
+                "distance_m": other.distance_m, "score_ratio": other.score_ratio,
+            })),
+            "candidates": found.candidates,
+        })),
+        "plugins": plugins.iter().map(document::plugin_use).collect::<Vec<_>>(),
+        "gates": document::gates(gates),
+        "rejections": rejections.iter().map(|rejection| document::rejection(rejection, classes)).collect::<Vec<_>>(),
+        "decision": decision.name(),
+    })
+}
+
+fn print(step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
+    let record = &step.record;
+    let (version, kind, author) = (record.version, record.kind.name(), &record.author);
+    console.line(format_args!("version {version}: {} by {kind}, {author}, {}", op(step), record.committed_at))?;
+    console.line(format_args!("  message   {}", record.message))?;
+    let Some(recorded) = &step.observation else { return console.line("  evidence  none: not made from a capture") };
+    let seen = &recorded.observation;
+    let taken = seen.taken_at.map_or_else(|| "unknown".to_owned(), |time| time.to_string());
+    console.line(format_args!("  capture   sha256 {}, taken {taken}", seen.capture))?;
+    if let Some(prior) = &seen.prior {
+        console.line(format_args!("  prior     {}", pose_text(&prior.pose)))?;
+    }
+    if let Some(found) = &seen.localization {
+        console.line(format_args!("  pose      {}", pose_text(&found.pose)))?;
+    }
+    for gate in &seen.gates {
+        let verdict = if gate.passed { "passed" } else { "failed" };
+        console.line(format_args!(
+            "  gate      {} {:.3} {}, limit {:.3}: {verdict}",
+            gate.name, gate.measured, gate.unit, gate.limit
+        ))?;
+    }
+    for used in &seen.plugins {
+        let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
+        console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
+    }
+    for rejection in &seen.rejections {
+        let (before, after) = (classes.name(rejection.class_before), classes.name(rejection.class_after));
+        console.line(format_args!(
+            "  rejected  {before} -> {after}, {} px: {} is {:.3} {}, limit {:.3}",
+            rejection.pixels, rejection.requirement, rejection.measured, rejection.unit, rejection.limit
+        ))?;
+    }
+    Ok(())
+}

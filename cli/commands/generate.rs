@@ -1,0 +1,24 @@
+//! `resurvey completions` and `resurvey man`.
+
+use crate::args::{Cli, Completions, Man};
+use crate::console::Console;
+use crate::failure::Failure;
+use clap::CommandFactory;
+
+/// Prints a completion script.
+pub fn completions(options: &Completions, console: &mut Console<'_>) -> Result<u8, Failure> {
+    // Through memory: the generator panics when its writer fails, and a closed pipe is no bug.
+    let mut script = Vec::new();
+    clap_complete::generate(options.shell, &mut Cli::command(), "resurvey", &mut script);
+    console.out().write_all(&script)?;
+    Ok(0)
+}
+
+/// Writes a manual page per command.
+pub fn man(options: &Man, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let failed = |error: std::io::Error| Failure::input(format!("{}: {error}", options.out.display()));
+    std::fs::create_dir_all(&options.out).map_err(failed)?;
+    clap_mangen::generate_to(Cli::command(), &options.out).map_err(failed)?;
+    console.message(&format!("manual pages are in {}", options.out.display()));
+    Ok(0)
+}

@@ -1,0 +1,114 @@
+//! `resurvey import`.
+
+use super::crs_of;
+use crate::args::{Import, UpAxis};
+use crate::console::Console;
+use crate::failure::Failure;
+use jiff::Timestamp;
+use resurvey_core::crs::Crs;
+use resurvey_core::image::LabelReading;
+use resurvey_core::mesh::{ClassMap, ImportOptions, Imported, Object, Up, encode_mesh, import_model};
+use resurvey_core::store::MapFile;
+use resurvey_core::version::{BoxMm, FeatureState, UpdateTransaction, VersionKind};
+use resurvey_schema::{ClassTable, GridPoint};
+use serde_json::json;
+
+/// Adds the objects of all files as one version.
+pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open(&options.map)?;
+    let head = map.head()?;
+    let snapshot = map.snapshot(head)?;
+    let crs = crs_of(&map)?;
+    let how = import_options(options, snapshot.classes())?;
+    let message = options.message.clone().unwrap_or_else(|| {
+        let names: Vec<String> = options.files.iter().map(|file| file.display().to_string()).collect();
+        format!("import {}", names.join(", "))
+    });
+    let mut transaction = UpdateTransaction::new(head, VersionKind::Import, &options.author, message);
+    let mut reports = Vec::new();
+    let stage = console.stage("import");
+    for file in &options.files {
+        let mut imported = import_model(file, &how, snapshot.classes())?;
+        if let Some(source) = &options.crs {
+            move_between(&mut imported, crs, source.parse()?)?;
+        }
+        for object in &imported.objects {
+            add_object(&mut transaction, object)?;
+        }
+        reports.push((file.display().to_string(), imported.report));
+    }
+    let version = map.commit(&transaction, Timestamp::now())?;
+    console.finish(&stage);
+    for (file, report) in &reports {
+        for warning in &report.warnings {
+            console.message(&format!("{file}: {warning}"));
+        }
+    }
+    if console.is_json() {
+        let files: Vec<_> = reports
+            .iter()
+            .map(|(file, report)| {
+                json!({
+                    "file": file, "format": report.format, "origin": report.origin, "objects": report.objects,
+                    "triangles": report.triangles, "textures": report.textures,
+                    "degenerate_faces": report.degenerate_faces, "empty_objects": report.empty_objects,
+                    "skipped_primitives": report.skipped_primitives, "warnings": report.warnings,
+                })
+            })
+            .collect();
+        console.document(&json!({ "version": version.0, "files": files }))?;
+    } else {
+        for (file, report) in &reports {
+            let (objects, triangles, textures) = (report.objects, report.triangles, report.textures);
+            console.line(format_args!(
+                "{file}: {} with {objects} objects, {triangles} triangles, {textures} label textures",
+                report.format
+            ))?;
+        }
+        console.line(format_args!("version {version}"))?;
+    }
+    Ok(0)
+}
+
+fn import_options(options: &Import, classes: &ClassTable) -> Result<ImportOptions, Failure> {
+    let class_map = options.map_classes.as_deref().map(|path| {
+        let text =
+            std::fs::read_to_string(path).map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+        ClassMap::parse(&text, classes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+    });
+    if let Some(distance) = options.nearest_colour
+        && !(distance.is_finite() && distance >= 0.0)
+    {
+        return Err(Failure::usage(format!("--nearest-colour {distance}: expected 0 to 441")));
+    }
+    if !options.rotate.is_finite() {
+        return Err(Failure::usage(format!("--rotate {}: expected degrees", options.rotate)));
+    }
+    Ok(ImportOptions {
+        origin: options.origin.map(GridPoint::from),
+        up: options.up.map(|up| match up {
+            UpAxis::Y => Up::Y,
+            UpAxis::Z => Up::Z,
+        }),
+        rotate_deg: options.rotate,
+        class_map: class_map.transpose()?,
+        labels: LabelReading { void_index: options.void_index, nearest_colour: options.nearest_colour },
+    })
+}
+
+/// Moves objects whose coordinates are those of `source` into the map's grid: each by its origin, and turned there by
+/// nothing, so an object keeps its shape.
+fn move_between(imported: &mut Imported, crs: Crs, source: Crs) -> Result<(), Failure> {
+    for object in &mut imported.objects {
+        object.mesh.origin = crs.grid_from_other(source, object.mesh.origin).map_err(Failure::input)?;
+    }
+    Ok(())
+}
+
+fn add_object(transaction: &mut UpdateTransaction, object: &Object) -> Result<(), Failure> {
+    let (low, high) = object.mesh.bounds();
+    let bounds = BoxMm::new(low, high).map_err(Failure::input)?;
+    let geometry = transaction.add_geometry(encode_mesh(&object.mesh));
+    transaction.additions.push(FeatureState::Object { name: object.name.clone(), geometry, bounds });
+    Ok(())
+}

@@ -1,0 +1,89 @@
+//! `resurvey localize`.
+
+use super::{crs_of, write_file};
+use crate::args::{Localize, PluginSearch};
+use crate::console::Console;
+use crate::document;
+use crate::failure::{Failure, UNRELIABLE};
+use crate::tools::{Choices, registry};
+use resurvey_core::capture::{Capture, read_pose};
+use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
+use resurvey_core::store::MapFile;
+use resurvey_core::update::world_around;
+use resurvey_schema::Pose;
+use serde_json::{Map, json};
+use std::path::Path;
+
+/// Finds the pose of a capture. Exit code 0 when it is reliable, 22 when it is not.
+pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let registry = registry(plugins)?;
+    let plugin = registry.load(&options.matcher)?;
+    let choices = Choices::read(&options.settings, &[&options.matcher])?;
+    let tool = choices.tool(&plugin)?;
+    let mut matcher = tool.plugin.matcher(&tool.settings)?;
+    let map = MapFile::open_read_only(&options.map)?;
+    let snapshot = map.snapshot(map.resolve(&options.at)?)?;
+    let crs = crs_of(&map)?;
+    let truth = options.truth.as_deref().map(read_pose).transpose()?;
+    let mut timings = Map::new();
+    let stage = console.stage("read");
+    let capture = Capture::read(&options.capture, snapshot.classes(), crs)?;
+    let world = world_around(&snapshot, capture.prior.pose.position)?;
+    timings.insert("read".to_owned(), json!(console.finish(&stage)));
+    let stage = console.stage("localize");
+    let services = SceneServices::new(&world, &capture, crs, &stage);
+    let located = localize(&mut matcher, &services, &choices.gate, &choices.search)?;
+    timings.insert("localize".to_owned(), json!(console.finish(&stage)));
+    if let Some(path) = &options.heatmap {
+        let picture = heat_map(&HeatMap {
+            heat: &located.localization.heat,
+            prior: capture.prior.pose,
+            estimate: located.localization.pose,
+            truth,
+            covariance: located.localization.covariance,
+            score: located.localization.score,
+            title: &title(&options.capture, &options.matcher),
+        })?;
+        write_file(path, &picture)?;
+    }
+    let result = document::located(&located, matcher.info(), crs, &timings);
+    if let Some(path) = &options.out {
+        write_file(path, &serde_json::to_vec_pretty(&result)?)?;
+    }
+    if console.is_json() {
+        console.document(&result)?;
+    } else {
+        summary(&located, console)?;
+    }
+    Ok(if located.is_reliable() { 0 } else { UNRELIABLE })
+}
+
+fn title(capture: &Path, matcher: &str) -> String {
+    let directory = capture.parent().and_then(Path::file_name).unwrap_or_default();
+    format!("{} {matcher}", directory.to_string_lossy())
+}
+
+/// The result in a few lines.
+pub fn summary(located: &resurvey_core::localize::Located, console: &mut Console<'_>) -> Result<(), Failure> {
+    let localization = &located.localization;
+    console.line(format_args!("pose       {}", pose_text(&localization.pose)))?;
+    let [e, n, yaw] = [0, 1, 2].map(|axis| localization.covariance[axis][axis].max(0.0).sqrt());
+    console.line(format_args!("1 sigma    {e:.2} m east, {n:.2} m north, {:.2}° heading", yaw.to_degrees()))?;
+    let (candidates, skipped) = (localization.candidates, localization.skipped);
+    console.line(format_args!(
+        "score      {:.3} of {candidates} candidates, {skipped} inside buildings",
+        localization.score
+    ))?;
+    if located.is_reliable() {
+        return console.line("reliable   yes");
+    }
+    console.line(format_args!("reliable   no: {}", located.reasons.join("; ")))
+}
+
+/// A pose for people.
+pub fn pose_text(pose: &Pose) -> String {
+    let [e, n, h]: [f64; 3] = pose.position.into();
+    let yaw = pose.yaw_rad.to_degrees().rem_euclid(360.0);
+    let (pitch, roll) = (pose.pitch_rad.to_degrees(), pose.roll_rad.to_degrees());
+    format!("E {e:.2} N {n:.2} H {h:.2} m, heading {yaw:.2}°, pitch {pitch:.2}°, roll {roll:.2}°")
+}

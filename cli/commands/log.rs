@@ -1,0 +1,55 @@
+//! `resurvey log`.
+
+use super::crs_of;
+use crate::args::Log;
+use crate::console::Console;
+use crate::document;
+use crate::failure::Failure;
+use crate::region;
+use comfy_table::{Table, presets};
+use resurvey_core::store::MapFile;
+use resurvey_core::version::{Fid, VersionRecord};
+use serde_json::json;
+
+/// Versions that changed something, newest first.
+pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open_read_only(&options.map)?;
+    let bounds = region::bbox(&options.region, crs_of(&map)?, false)?;
+    let mut records: Vec<VersionRecord> = match (options.fid, bounds) {
+        (Some(_), Some(_)) => return Err(Failure::usage("expected a feature id or a region, found both")),
+        (Some(fid), None) => map.log_of(Fid(fid))?,
+        (None, Some(bounds)) => map.log_in(&bounds)?,
+        (None, None) => map.log()?,
+    };
+    records.truncate(options.limit.unwrap_or(usize::MAX));
+    if console.is_json() {
+        let versions: Vec<_> = records.iter().map(document::version).collect();
+        console.document(&json!({ "versions": versions }))?;
+        return Ok(0);
+    }
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header([
+        "version",
+        "kind",
+        "committed",
+        "author",
+        "+",
+        "~",
+        "-",
+        "message",
+    ]);
+    for record in &records {
+        table.add_row([
+            record.version.to_string(),
+            record.kind.name().to_owned(),
+            record.committed_at.to_string(),
+            record.author.clone(),
+            record.counts.added.to_string(),
+            record.counts.modified.to_string(),
+            record.counts.removed.to_string(),
+            record.message.clone(),
+        ]);
+    }
+    console.line(table.trim_fmt())?;
+    Ok(0)
+}

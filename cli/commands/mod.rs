@@ -1,0 +1,33 @@
+//! One module per command.
+
+pub mod apply;
+pub mod evidence;
+pub mod export;
+pub mod fsck;
+pub mod generate;
+pub mod import;
+pub mod init;
+pub mod localize;
+pub mod log;
+pub mod plugins;
+pub mod query;
+pub mod render;
+pub mod update;
+
+use crate::failure::Failure;
+use resurvey_core::crs::Crs;
+use resurvey_core::store::{MapFile, StoreError};
+use std::path::Path;
+
+/// The map's coordinate reference system.
+fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
+    let frame = map.info()?.frame;
+    frame.crs.parse().map_err(|error: resurvey_core::crs::CrsError| {
+        StoreError::Damaged { path: map.path().to_owned(), detail: error.to_string() }.into()
+    })
+}
+
+/// Writes a file that the user named.
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}

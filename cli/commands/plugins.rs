@@ -1,0 +1,81 @@
+//! `resurvey plugins`.
+
+use crate::args::{PluginSearch, Plugins};
+use crate::console::Console;
+use crate::document;
+use crate::failure::Failure;
+use crate::tools::registry;
+use comfy_table::{Table, presets};
+use resurvey_core::plugin::Registry;
+use serde_json::json;
+
+/// Lists or describes plugins.
+pub fn run(command: &Plugins, search: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let registry = registry(search)?;
+    match command {
+        Plugins::List { verbose } => list(&registry, *verbose, console),
+        Plugins::Info { name } => info(&registry, name, console),
+    }
+}
+
+fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let plugins = registry.list();
+    if console.is_json() {
+        let skipped: Vec<_> = (registry.skipped().iter())
+            .map(|skipped| json!({ "path": skipped.path.display().to_string(), "reason": skipped.refusal.to_string() }))
+            .collect();
+        let directories: Vec<_> = registry.directories().iter().map(|path| path.display().to_string()).collect();
+        console.document(&json!({
+            "plugins": plugins.iter().map(document::plugin_info).collect::<Vec<_>>(),
+            "directories": directories,
+            "skipped": skipped,
+        }))?;
+        return Ok(0);
+    }
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(["name", "kind", "version", "from", "what it does"]);
+    for plugin in &plugins {
+        let from = plugin.path.as_ref().map_or_else(|| "built in".to_owned(), |path| path.display().to_string());
+        table.add_row([
+            plugin.name.clone(),
+            plugin.kind.to_string(),
+            plugin.version.clone(),
+            from,
+            plugin.summary.clone(),
+        ]);
+    }
+    console.line(table.trim_fmt())?;
+    if is_verbose {
+        for directory in registry.directories() {
+            console.line(format_args!("searched {}", directory.display()))?;
+        }
+        for skipped in registry.skipped() {
+            console.line(&skipped.refusal)?;
+        }
+    }
+    Ok(0)
+}
+
+fn info(registry: &Registry, name: &str, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let plugin = registry.load(name)?;
+    let info = plugin.info();
+    let settings = plugin.schema().iter();
+    if console.is_json() {
+        let mut document = document::plugin_info(info);
+        let schema = info.settings_schema.as_deref().and_then(|text| serde_json::from_str(text).ok());
+        document["settings_schema"] = schema.unwrap_or(serde_json::Value::Null);
+        console.document(&document)?;
+        return Ok(0);
+    }
+    console.line(format_args!("{} {} ({}): {}", info.name, info.version, info.kind, info.summary))?;
+    console.line(format_args!("sha256 {}", info.sha256))?;
+    for (key, setting) in settings {
+        console.line(format_args!(
+            "  {name}.{key}={}  {} ({})",
+            setting.default,
+            setting.description,
+            setting.expected()
+        ))?;
+    }
+    Ok(0)
+}

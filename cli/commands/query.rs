@@ -1,0 +1,260 @@
+//! `resurvey query`.
+
+use super::crs_of;
+use crate::args::{Query, QueryFormat};
+use crate::console::Console;
+use crate::document;
+use crate::failure::{Failure, MISSING};
+use crate::region::{self, Shape};
+use comfy_table::{Table, presets};
+use resurvey_core::crs::Crs;
+use resurvey_core::store::{MapFile, Snapshot};
+use resurvey_core::version::{Feature, FeatureState};
+use resurvey_schema::{ClassTable, Descriptor, GridPoint};
+use serde_json::{Map, Value, json};
+
+/// Descriptors and objects in a region at a version.
+pub fn run(options: &Query, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open_read_only(&options.map)?;
+    let snapshot = map.snapshot(map.resolve(&options.at)?)?;
+    let crs = crs_of(&map)?;
+    check_classes(&options.class, snapshot.classes())?;
+    let features = features(options, &snapshot, crs)?;
+    let answer = Answer { features: &features, classes: snapshot.classes(), crs, is_wgs84: options.wgs84 };
+    match if console.is_json() { QueryFormat::Json } else { options.format } {
+        QueryFormat::Table => answer.table(console)?,
+        QueryFormat::Json => {
+            let features = features.iter().map(|feature| answer.fields(feature)).collect::<Result<Vec<_>, _>>()?;
+            console.document(&json!({ "version": snapshot.version().0, "features": features }))?;
+        }
+        QueryFormat::Geojson => {
+            let features = features.iter().map(|feature| answer.geojson(feature)).collect::<Result<Vec<_>, _>>()?;
+            console.document(&json!({ "type": "FeatureCollection", "features": features }))?;
+        }
+        QueryFormat::Csv => answer.csv(console)?,
+    }
+    Ok(0)
+}
+
+fn check_classes(names: &[String], classes: &ClassTable) -> Result<(), Failure> {
+    for name in names {
+        if classes.by_name(name).is_none() {
+            let known: Vec<&str> = classes.iter().map(|class| class.name.as_str()).collect();
+            let text = format!("no class {name:?} in the map; it has {}", known.join(", "));
+            return Err(Failure::new(MISSING, anyhow::anyhow!(text)));
+        }
+    }
+    Ok(())
+}
+
+fn features(options: &Query, snapshot: &Snapshot<'_>, crs: Crs) -> Result<Vec<Feature>, Failure> {
+    let shape = match (&options.polygon, options.near, options.radius) {
+        (Some(path), _, _) => Some(Shape::read_polygon(path, crs, options.wgs84)?),
+        (None, Some([latitude, longitude]), Some(radius_m)) => {
+            if !(radius_m.is_finite() && radius_m >= 0.0) {
+                return Err(Failure::usage(format!("--radius {radius_m}: expected metres, 0 or more")));
+            }
+            Some(Shape::Circle { centre: region::grid_point(crs, latitude, longitude)?, radius_m })
+        }
+        _ => None,
+    };
+    let bounds = match &shape {
+        Some(shape) => Some(region::around(&shape.outline(), region::checked_heights(&options.region)?)?),
+        None => region::bbox(&options.region, crs, options.wgs84)?,
+    };
+    let found = match bounds {
+        Some(bounds) => snapshot.features_in(&bounds)?,
+        None => snapshot.features()?,
+    };
+    let wanted = |feature: &Feature| {
+        let class = feature.state.class().map(|class| snapshot.classes().name(class));
+        let of_class = options.class.is_empty()
+            || options.class.iter().any(|name| class.is_some_and(|class| class.eq_ignore_ascii_case(name)));
+        let inside = match (&shape, &feature.state) {
+            (None, _) => true,
+            (Some(shape), FeatureState::Descriptor(descriptor)) => shape.holds(descriptor),
+            // An object is in a shape when the middle of its box is.
+            (Some(shape), FeatureState::Object { .. }) => shape.contains(&middle(&feature.state)),
+        };
+        of_class && inside
+    };
+    Ok(found.into_iter().filter(wanted).collect())
+}
+
+fn middle(state: &FeatureState) -> GridPoint {
+    match state {
+        FeatureState::Descriptor(descriptor) => descriptor.anchor(),
+        FeatureState::Object { bounds, .. } => {
+            let [low, high] = bounds.corners();
+            GridPoint::new(
+                (low.easting_m + high.easting_m) / 2.0,
+                (low.northing_m + high.northing_m) / 2.0,
+                (low.height_m + high.height_m) / 2.0,
+            )
+        }
+    }
+}
+
+struct Answer<'a> {
+    features: &'a [Feature],
+    classes: &'a ClassTable,
+    crs: Crs,
+    is_wgs84: bool,
+}
+
+impl Answer<'_> {
+    fn class<'b>(&'b self, feature: &'b Feature) -> &'b str {
+        match &feature.state {
+            FeatureState::Descriptor(descriptor) => self.classes.name(descriptor.class()),
+            FeatureState::Object { name, .. } => name,
+        }
+    }
+
+    /// `x, y, height` of a point: grid metres, or longitude, latitude and ellipsoidal height.
+    fn coordinates(&self, point: GridPoint) -> Result<[f64; 3], Failure> {
+        if !self.is_wgs84 {
+            return Ok(point.into());
+        }
+        let position = region::wgs84(self.crs, point)?;
+        Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
+    }
+
+    fn fields(&self, feature: &Feature) -> Result<Map<String, Value>, Failure> {
+        let mut fields = document::feature(feature, self.classes)?;
+        if self.is_wgs84 {
+            let position = region::wgs84(self.crs, middle(&feature.state))?;
+            fields.insert("latitude".to_owned(), json!(position.latitude_deg));
+            fields.insert("longitude".to_owned(), json!(position.longitude_deg));
+        }
+        Ok(fields)
+    }
+
+    fn table(&self, console: &mut Console<'_>) -> Result<(), Failure> {
+        let mut table = Table::new();
+        let [x, y, h] = if self.is_wgs84 { ["longitude", "latitude", "ellipsoidal m"] } else { ["E m", "N m", "H m"] };
+        table.load_preset(presets::NOTHING).set_header([
+            "fid",
+            "kind",
+            "class or name",
+            x,
+            y,
+            h,
+            "size m",
+            "from",
+            "to",
+        ]);
+        for feature in self.features {
+            let [east, north, height] = self.coordinates(middle(&feature.state))?;
+            let digits = if self.is_wgs84 { 8 } else { 2 };
+            table.add_row([
+                feature.fid.to_string(),
+                feature.state.kind_name().to_owned(),
+                self.class(feature).to_owned(),
+                format!("{east:.digits$}"),
+                format!("{north:.digits$}"),
+                format!("{height:.2}"),
+                size(&feature.state, self.classes),
+                feature.from.to_string(),
+                feature.to.map_or_else(|| "-".to_owned(), |version| version.to_string()),
+            ]);
+        }
+        console.line(table.trim_fmt())?;
+        console.message(&format!("{} features", self.features.len()));
+        Ok(())
+    }
+
+    fn csv(&self, console: &mut Console<'_>) -> Result<(), Failure> {
+        let [x, y, h] = if self.is_wgs84 {
+            ["longitude", "latitude", "ellipsoidal_height_m"]
+        } else {
+            ["easting_m", "northing_m", "height_m"]
+        };
+        console.line(format_args!("fid,kind,class,name,{x},{y},{h},width_m,height_m,area_m2,sigma_m,from,to"))?;
+        for feature in self.features {
+            let [east, north, height] = self.coordinates(middle(&feature.state))?;
+            let fields = document::feature(feature, self.classes)?;
+            let cell =
+                |key: &str| fields.get(key).filter(|value| !value.is_null()).map_or_else(String::new, Value::to_string);
+            let text = |key: &str| quoted(fields.get(key).and_then(Value::as_str).unwrap_or_default());
+            console.line(format_args!(
+                "{},{},{},{},{east},{north},{height},{},{},{},{},{},{}",
+                feature.fid,
+                feature.state.kind_name(),
+                text("class"),
+                text("name"),
+                cell("width_m"),
+                cell("height_m"),
+                cell("area_m2"),
+                cell("sigma_m"),
+                cell("from"),
+                cell("to"),
+            ))?;
+        }
+        Ok(())
+    }
+
+    /// A GeoJSON feature in WGS84: a closed ring for a rectangle, a point for an object on the ground, a box for an
+    /// object of the model.
+    fn geojson(&self, feature: &Feature) -> Result<Value, Failure> {
+        let position = |point: GridPoint| -> Result<[f64; 3], Failure> {
+            let position = region::wgs84(self.crs, point)?;
+            Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
+        };
+        let ring = |corners: &[GridPoint]| -> Result<Value, Failure> {
+            let closed = corners.iter().chain(corners.first());
+            let ring = closed.map(|corner| position(*corner)).collect::<Result<Vec<_>, _>>()?;
+            Ok(json!({ "type": "Polygon", "coordinates": [ring] }))
+        };
+        let geometry = match &feature.state {
+            FeatureState::Descriptor(Descriptor::Material(material)) => ring(&material.corners)?,
+            FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => {
+                json!({ "type": "Point", "coordinates": position(dynamic.position)? })
+            }
+            FeatureState::Object { bounds, .. } => {
+                let [low, high] = bounds.corners();
+                let (west, south, east, north, h) =
+                    (low.easting_m, low.northing_m, high.easting_m, high.northing_m, low.height_m);
+                ring(
+                    &[(west, south), (east, south), (east, north), (west, north)].map(|(e, n)| GridPoint::new(e, n, h)),
+                )?
+            }
+        };
+        let properties = document::feature(feature, self.classes)?;
+        Ok(json!({ "type": "Feature", "id": feature.fid.0, "geometry": geometry, "properties": properties }))
+    }
+}
+
+fn size(state: &FeatureState, classes: &ClassTable) -> String {
+    match state {
+        FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => {
+            let [along, across, up] = dynamic.size_m;
+            format!("{along:.2} x {across:.2} x {up:.2}")
+        }
+        FeatureState::Descriptor(descriptor) => {
+            let file = resurvey_core::version::descriptor_to_file(descriptor, classes);
+            format!("{:.2} x {:.2}", file.width_m.unwrap_or_default(), file.height_m.unwrap_or_default())
+        }
+        FeatureState::Object { bounds, .. } => {
+            let [low, high] = bounds.corners();
+            let (e, n, h) =
+                (high.easting_m - low.easting_m, high.northing_m - low.northing_m, high.height_m - low.height_m);
+            format!("{e:.1} x {n:.1} x {h:.1}")
+        }
+    }
+}
+
+/// A CSV cell, quoted where it must be (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn names_with_commas_and_quotes_stay_one_cell() {
+        assert_eq!(quoted("tower \"A\", north"), "\"tower \"\"A\"\", north\"");
+        assert_eq!(quoted("tower"), "tower");
+    }
+}

@@ -1,0 +1,338 @@
+//! `resurvey update`: localize, detect, estimate, commit.
+
+use super::crs_of;
+use crate::args::{PluginSearch, Update};
+use crate::commands::localize::pose_text;
+use crate::console::{Console, Stage};
+use crate::document;
+use crate::failure::{Failure, NOTHING, UNRELIABLE};
+use crate::tools::{Choices, Tool, registry};
+use jiff::Timestamp;
+use resurvey_core::capture::{Capture, read_pose};
+use resurvey_core::crs::Crs;
+use resurvey_core::localize::{Located, SceneServices, World, localize};
+use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
+use resurvey_core::render::view;
+use resurvey_core::store::MapFile;
+use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve, world_around};
+use resurvey_core::version::{
+    BoxMm, Decision, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,
+};
+use resurvey_schema::{Localization, Pose};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// Updates the map with every capture in turn. The exit code is 0 when any of them changed something, else that of the
+/// last one that did not.
+pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let mut tools = Tools::load(options, plugins)?;
+    let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
+    let given = options.pose.as_deref().map(read_pose).transpose()?;
+    let mut documents = Vec::new();
+    let mut code = NOTHING;
+    for path in &options.captures {
+        let mut run = Run { map: &map, crs: crs_of(&map)?, options, timings: Map::new() };
+        let (document, of_capture) = run.capture(path, given, &mut tools, console)?;
+        code = if documents.is_empty() || code != 0 { of_capture } else { code };
+        documents.push(document);
+    }
+    if console.is_json() {
+        match documents.as_slice() {
+            [only] => console.document(only)?,
+            several => console.document(&several)?,
+        }
+    }
+    Ok(code)
+}
+
+/// The three plugins of one run.
+struct Tools {
+    choices: Choices,
+    matcher: Matcher,
+    detector: Detector,
+    estimator: Estimator,
+    used: Vec<PluginUse>,
+}
+
+impl Tools {
+    fn load(options: &Update, plugins: &PluginSearch) -> Result<Self, Failure> {
+        let registry = registry(plugins)?;
+        let names = [options.matcher.as_str(), options.detector.as_str(), options.estimator.as_str()];
+        let choices = Choices::read(&options.settings, &names)?;
+        let load = |name: &str| -> Result<Tool, Failure> { choices.tool(&registry.load(name)?) };
+        let [matcher, detector, estimator] = [load(names[0])?, load(names[1])?, load(names[2])?];
+        Ok(Self {
+            matcher: matcher.plugin.matcher(&matcher.settings)?,
+            detector: detector.plugin.detector(&detector.settings)?,
+            estimator: estimator.plugin.estimator(&estimator.settings)?,
+            used: vec![matcher.used()?, detector.used()?, estimator.used()?],
+            choices,
+        })
+    }
+}
+
+struct Run<'a> {
+    map: &'a MapFile,
+    crs: Crs,
+    options: &'a Update,
+    timings: Map<String, Value>,
+}
+
+/// What one capture came to, before it is committed.
+struct Outcome {
+    located: Located,
+    resolution: Resolution,
+    viewed_region: Option<BoxMm>,
+}
+
+impl Run<'_> {
+    fn capture(
+        &mut self,
+        path: &Path,
+        given: Option<Pose>,
+        tools: &mut Tools,
+        console: &mut Console<'_>,
+    ) -> Result<(Value, u8), Failure> {
+        let base = self.map.head()?;
+        let snapshot = self.map.snapshot(base)?;
+        let stage = console.stage("read");
+        let capture = Capture::read(path, snapshot.classes(), self.crs)?;
+        let world = world_around(&snapshot, given.unwrap_or(capture.prior.pose).position)?;
+        self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
+        let located = self.locate(&world, &capture, given, tools, console)?;
+        let matcher = tools.matcher.info().clone();
+        let outcome = if located.is_reliable() {
+            self.compare(&world, &capture, located, tools, console)?
+        } else {
+            Outcome { located, resolution: Resolution::default(), viewed_region: None }
+        };
+        let stage = console.stage("commit");
+        let committed = self.commit(base, &capture, given.is_some(), &outcome, tools)?;
+        self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
+        self.report(path, base, &outcome, &committed, (&matcher, &tools.used), console)
+    }
+
+    fn locate(
+        &mut self,
+        world: &World,
+        capture: &Capture,
+        given: Option<Pose>,
+        tools: &mut Tools,
+        console: &mut Console<'_>,
+    ) -> Result<Located, Failure> {
+        if let Some(pose) = given {
+            return Ok(Located::new(exactly(pose), &tools.choices.gate));
+        }
+        let stage = console.stage("localize");
+        let services = SceneServices::new(world, capture, self.crs, &stage);
+        let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search)?;
+        self.timings.insert("localize".to_owned(), json!(console.finish(&stage)));
+        Ok(located)
+    }
+
+    fn compare(
+        &mut self,
+        world: &World,
+        capture: &Capture,
+        located: Located,
+        tools: &mut Tools,
+        console: &mut Console<'_>,
+    ) -> Result<Outcome, Failure> {
+        let mut time = |name: &'static str, console: &mut Console<'_>, stage: &Stage| {
+            self.timings.insert(name.to_owned(), json!(console.finish(stage)));
+        };
+        let stage = console.stage("view");
+        let scene = world.scene(true);
+        let view = view(scene, &capture.camera, &located.localization.pose);
+        let estimate = pose_estimate(&located.localization, capture);
+        let comparison = Comparison { capture, view: &view, scene, estimate };
+        time("view", console, &stage);
+        let stage = console.stage("detect");
+        let services = SceneServices::new(world, capture, self.crs, &stage);
+        let regions = comparison.detect(&mut tools.detector, &services)?;
+        time("detect", console, &stage);
+        let stage = console.stage("estimate");
+        let services = SceneServices::new(world, capture, self.crs, &stage);
+        let proposals = comparison.estimate(&mut tools.estimator, &services, &regions)?;
+        time("estimate", console, &stage);
+        let resolution = resolve(proposals, &regions, world.descriptors());
+        Ok(Outcome { located, resolution, viewed_region: comparison.viewed_region() })
+    }
+
+    /// Commits the changes, or records the attempt; a dry run does neither.
+    fn commit(
+        &self,
+        base: VersionId,
+        capture: &Capture,
+        is_given: bool,
+        outcome: &Outcome,
+        tools: &Tools,
+    ) -> Result<Committed, Failure> {
+        let decision = match (outcome.located.is_reliable(), outcome.resolution.changes.is_empty()) {
+            (false, _) => Decision::Unreliable,
+            (true, true) => Decision::Nothing,
+            (true, false) => Decision::Committed,
+        };
+        if self.options.dry_run {
+            return Ok(Committed { decision, version: None, fids: Vec::new() });
+        }
+        let evidence = self.evidence(capture, is_given, outcome, tools, decision);
+        let now = Timestamp::now();
+        if decision != Decision::Committed {
+            self.map.record_observation(base, &evidence, now)?;
+            return Ok(Committed { decision, version: None, fids: Vec::new() });
+        }
+        let message = self.options.message.clone().unwrap_or_else(|| message_of(&outcome.resolution.changes));
+        let mut transaction = UpdateTransaction::new(base, VersionKind::Update, &self.options.author, message);
+        transaction.observed_at = capture.taken_at;
+        transaction.viewed_region = outcome.viewed_region;
+        transaction.evidence = Some(evidence);
+        add_changes(&mut transaction, &outcome.resolution.changes);
+        let version = self.map.commit(&transaction, now)?;
+        let changes = self.map.changes_of(version)?;
+        let fids = changes.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
+        Ok(Committed { decision, version: Some(version), fids })
+    }
+
+    fn evidence(
+        &self,
+        capture: &Capture,
+        is_given: bool,
+        outcome: &Outcome,
+        tools: &Tools,
+        decision: Decision,
+    ) -> Observation {
+        let localization = &outcome.located.localization;
+        Observation {
+            capture: capture.digest,
+            taken_at: capture.taken_at,
+            labels: self.options.keep_labels.then(|| capture.label_bytes.clone()),
+            prior: Some(capture.prior),
+            localization: Some(LocalizationEvidence {
+                pose: localization.pose,
+                score: (!is_given).then_some(localization.score),
+                covariance: localization.covariance,
+                runner_up: localization.runner_up,
+                candidates: localization.candidates,
+            }),
+            plugins: tools.used.iter().skip(usize::from(is_given)).cloned().collect(),
+            gates: outcome.located.gates.clone(),
+            rejections: outcome.resolution.rejections.clone(),
+            decision,
+        }
+    }
+
+    fn report(
+        &self,
+        path: &Path,
+        base: VersionId,
+        outcome: &Outcome,
+        committed: &Committed,
+        (matcher, used): (&PluginInfo, &[PluginUse]),
+        console: &mut Console<'_>,
+    ) -> Result<(Value, u8), Failure> {
+        let snapshot = self.map.snapshot(base)?;
+        let classes = snapshot.classes();
+        let mut fids = committed.fids.iter().copied();
+        let changes: Vec<Value> = (outcome.resolution.changes.iter())
+            .map(|change| {
+                let fid = if matches!(change, Change::Add(_)) { fids.next() } else { None };
+                document::change(change, fid, classes)
+            })
+            .collect();
+        let (decision, code) = match committed.decision {
+            Decision::Unreliable => ("unreliable", UNRELIABLE),
+            Decision::Nothing => ("nothing", NOTHING),
+            _ if self.options.dry_run => ("dry-run", 0),
+            _ => ("committed", 0),
+        };
+        let rejections = outcome.resolution.rejections.iter();
+        let document = json!({
+            "capture": path.display().to_string(),
+            "base_version": base.0,
+            "version": committed.version.map(|version| version.0),
+            "decision": decision,
+            "localization": document::located(&outcome.located, matcher, self.crs, &self.timings),
+            "changes": changes,
+            "rejections": rejections.map(|rejection| document::rejection(rejection, classes)).collect::<Vec<_>>(),
+            "plugins": used.iter().map(document::plugin_use).collect::<Vec<_>>(),
+            "timings_ms": self.timings,
+        });
+        if !console.is_json() {
+            summary(path, &document, outcome, console)?;
+        }
+        Ok((document, code))
+    }
+}
+
+struct Committed {
+    decision: Decision,
+    version: Option<VersionId>,
+    fids: Vec<u64>,
+}
+
+/// A pose that was given is taken at its word.
+fn exactly(pose: Pose) -> Localization {
+    Localization {
+        pose,
+        score: 1.0,
+        covariance: [[0.0; 3]; 3],
+        runner_up: None,
+        candidates: 0,
+        skipped: 0,
+        heat: Vec::new(),
+    }
+}
+
+fn message_of(changes: &[Change]) -> String {
+    let count = |pick: fn(&Change) -> bool| changes.iter().filter(|change| pick(change)).count();
+    let added = count(|change| matches!(change, Change::Add(_)));
+    let modified = count(|change| matches!(change, Change::Modify { .. }));
+    let removed = count(|change| matches!(change, Change::Remove { .. }));
+    format!("update: {added} added, {modified} modified, {removed} removed")
+}
+
+fn summary(path: &Path, document: &Value, outcome: &Outcome, console: &mut Console<'_>) -> Result<(), Failure> {
+    let decision = document["decision"].as_str().unwrap_or_default();
+    let version = document["version"].as_u64().map_or_else(String::new, |version| format!(", version {version}"));
+    console.line(format_args!("{}: {decision}{version}", path.display()))?;
+    console.line(format_args!("  pose      {}", pose_text(&outcome.located.localization.pose)))?;
+    for reason in &outcome.located.reasons {
+        console.line(format_args!("  doubt     {reason}"))?;
+    }
+    for change in document["changes"].as_array().into_iter().flatten() {
+        let (op, class) = (change["op"].as_str().unwrap_or_default(), change["class"].as_str().unwrap_or_default());
+        let fid = change["fid"].as_u64().map_or_else(String::new, |fid| format!(" {fid}"));
+        let state = if change["after"].is_null() { &change["before"] } else { &change["after"] };
+        console.line(format_args!("  {op:9} {class}{fid} {}", place(state)))?;
+    }
+    for rejection in document["rejections"].as_array().into_iter().flatten() {
+        let text = |key: &str| rejection[key].as_str().unwrap_or_default().to_owned();
+        let number = |key: &str| rejection[key].as_f64().unwrap_or_default();
+        console.line(format_args!(
+            "  rejected  {} -> {}, {} px: {} is {:.3} {}, limit {:.3}",
+            text("class_before"),
+            text("class_after"),
+            number("pixels"),
+            text("requirement"),
+            number("measured"),
+            text("unit"),
+            number("limit"),
+        ))?;
+    }
+    Ok(())
+}
+
+/// Where a descriptor is and how large, in a few words.
+fn place(state: &Value) -> String {
+    let at = if state["centre"].is_null() { &state["position"] } else { &state["centre"] };
+    let number = |value: &Value| value.as_f64().unwrap_or_default();
+    let mut text = format!("at E {:.2} N {:.2} H {:.2}", number(&at[0]), number(&at[1]), number(&at[2]));
+    if let (Some(width), Some(height)) = (state["width_m"].as_f64(), state["height_m"].as_f64()) {
+        text += &format!(", {width:.2} x {height:.2} m");
+    }
+    if let Some(sigma) = state["sigma_m"].as_f64() {
+        text += &format!(", 1 sigma {sigma:.2} m");
+    }
+    text
+}

@@ -1,0 +1,146 @@
+//! Errors with their exit code: 2 usage, 10 input file, 11 no such thing, 12 plugin, 13 map file, 21 conflict.
+
+use resurvey_core::capture::CaptureError;
+use resurvey_core::crs::CrsError;
+use resurvey_core::export::ExportError;
+use resurvey_core::image::ImageError;
+use resurvey_core::mesh::{ClassMapError, EncodingError, ImportError};
+use resurvey_core::plugin::{PluginError, SettingsError};
+use resurvey_core::store::{CommitError, StoreError};
+use resurvey_core::update::UpdateError;
+use resurvey_core::version::{ChangeSetError, InvalidBox};
+use std::fmt;
+
+/// A bug in this program.
+pub const INTERNAL: u8 = 1;
+/// The command line.
+pub const USAGE: u8 = 2;
+/// A file that was given.
+pub const INPUT: u8 = 10;
+/// A map, revision, feature or plugin that is not there.
+pub const MISSING: u8 = 11;
+/// A plugin.
+pub const PLUGIN: u8 = 12;
+/// The map file.
+pub const MAP: u8 = 13;
+/// Not an error: nothing to update.
+pub const NOTHING: u8 = 20;
+/// The map changed since the base version.
+pub const CONFLICT: u8 = 21;
+/// Not an error: the pose is not reliable.
+pub const UNRELIABLE: u8 = 22;
+
+/// Why a command ended, and with which code.
+#[derive(Debug)]
+pub struct Failure {
+    code: u8,
+    error: anyhow::Error,
+}
+
+impl Failure {
+    /// An error of the kind that `code` stands for.
+    pub fn new(code: u8, error: impl Into<anyhow::Error>) -> Self {
+        Self { code, error: error.into() }
+    }
+
+    /// A wrong command line, in words.
+    pub fn usage(text: impl fmt::Display) -> Self {
+        Self { code: USAGE, error: anyhow::anyhow!("{text}") }
+    }
+
+    /// A wrong input file, in words.
+    pub fn input(text: impl fmt::Display) -> Self {
+        Self { code: INPUT, error: anyhow::anyhow!("{text}") }
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        self.code
+    }
+
+    /// Whether the reader of the output went away, which is no failure.
+    pub fn is_closed_pipe(&self) -> bool {
+        let is_closed = |error: &std::io::Error| error.kind() == std::io::ErrorKind::BrokenPipe;
+        self.error.downcast_ref::<std::io::Error>().is_some_and(is_closed)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{:#}", self.error)
+    }
+}
+
+macro_rules! failure_from {
+    ($($error:ty => $code:expr,)*) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::new($code, error)
+            }
+        })*
+    };
+}
+
+failure_from! {
+    std::io::Error => INTERNAL,
+    serde_json::Error => INTERNAL,
+    CaptureError => INPUT,
+    CrsError => USAGE,
+    ExportError => INTERNAL,
+    ImageError => INPUT,
+    ImportError => INPUT,
+    ClassMapError => INPUT,
+    EncodingError => MAP,
+    SettingsError => USAGE,
+    ChangeSetError => INPUT,
+    InvalidBox => USAGE,
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        let code = match &error {
+            StoreError::NotAMap { .. } | StoreError::NewerFormat { .. } | StoreError::Damaged { .. } => MAP,
+            StoreError::NotFound { .. }
+            | StoreError::NoSuchVersion { .. }
+            | StoreError::NoSuchFeature { .. }
+            | StoreError::NeverAFeature { .. }
+            | StoreError::NoSuchTag { .. }
+            | StoreError::BeforeFirst { .. } => MISSING,
+            StoreError::Revision(_) => USAGE,
+            _ => INPUT,
+        };
+        Self::new(code, error)
+    }
+}
+
+impl From<CommitError> for Failure {
+    fn from(error: CommitError) -> Self {
+        match error {
+            CommitError::Conflict { .. } => Self::new(CONFLICT, error),
+            CommitError::Store(error) => error.into(),
+            _ => Self::new(INPUT, error),
+        }
+    }
+}
+
+impl From<PluginError> for Failure {
+    fn from(error: PluginError) -> Self {
+        let code = match &error {
+            PluginError::Unknown { .. } => MISSING,
+            PluginError::Settings { .. } => USAGE,
+            _ => PLUGIN,
+        };
+        Self::new(code, error)
+    }
+}
+
+impl From<UpdateError> for Failure {
+    fn from(error: UpdateError) -> Self {
+        match error {
+            UpdateError::Store(error) => error.into(),
+            UpdateError::Plugin(error) => error.into(),
+            UpdateError::Geometry { .. } => Self::new(MAP, error),
+            _ => Self::new(INPUT, error),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The command line of resurvey as a library, so that examples and tests run what users run.
+#![forbid(unsafe_code)]
+
+mod args;
+mod commands;
+mod console;
+mod document;
+mod failure;
+mod region;
+mod tools;
+
+use args::{Cli, Command};
+use clap::Parser;
+use commands::{apply, evidence, export, fsck, generate, import, init, localize, log, plugins, query, render, update};
+use console::Console;
+use failure::{Failure, INTERNAL, USAGE};
+use std::ffi::OsString;
+use std::io::Write;
+
+/// Runs one command line, `args[0]` being the program's name, and returns the exit code that `docs/cli.md` documents.
+pub fn run<I>(args: I, out: &mut dyn Write, err: &mut dyn Write) -> u8
+where
+    I: IntoIterator,
+    I::Item: Into<OsString> + Clone,
+{
+    run_with_progress(args, out, err, false)
+}
+
+/// The same, with progress bars on standard error when `shows_progress`.
+pub fn run_with_progress<I>(args: I, out: &mut dyn Write, err: &mut dyn Write, shows_progress: bool) -> u8
+where
+    I: IntoIterator,
+    I::Item: Into<OsString> + Clone,
+{
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => return explain(&error, out, err),
+    };
+    let mut console = Console::new(out, err, cli.json, shows_progress);
+    match dispatch(&cli, &mut console) {
+        Ok(code) => code,
+        Err(failure) if failure.is_closed_pipe() => 0,
+        Err(failure) => {
+            console.message(&format!("resurvey: {failure}"));
+            failure.code()
+        }
+    }
+}
+
+/// Prints help to standard output, a usage error to standard error.
+fn explain(error: &clap::Error, out: &mut dyn Write, err: &mut dyn Write) -> u8 {
+    let text = error.render();
+    let written = if error.use_stderr() { write!(err, "{text}") } else { write!(out, "{text}") };
+    match (written, error.use_stderr()) {
+        (_, true) => USAGE,
+        (Ok(()), false) => 0,
+        (Err(_), false) => INTERNAL,
+    }
+}
+
+fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {
+    match &cli.command {
+        Command::Init(options) => init::run(options, console),
+        Command::Import(options) => import::run(options, console),
+        Command::Localize(options) => localize::run(options, &cli.plugins, console),
+        Command::Render(options) => render::run(options, console),
+        Command::Update(options) => update::run(options, &cli.plugins, console),
+        Command::Query(options) => query::run(options, console),
+        Command::Log(options) => log::run(options, console),
+        Command::Why(options) => evidence::run(options, console),
+        Command::Apply(options) => apply::run(options, console),
+        Command::Export(options) => export::run(options, console),
+        Command::Plugins(command) => plugins::run(command, &cli.plugins, console),
+        Command::Fsck(options) => fsck::run(options, console),
+        Command::Completions(options) => generate::completions(options, console),
+        Command::Man(options) => generate::man(options, console),
+    }
+}

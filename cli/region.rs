@@ -1,0 +1,146 @@
+//! Regions of the map as the command line names them.
+
+use crate::args::Region;
+use crate::failure::Failure;
+use geo::{Contains, Coord, LineString, Polygon};
+use geojson::{GeoJson, Value as Geometry};
+use resurvey_core::crs::Crs;
+use resurvey_core::version::BoxMm;
+use resurvey_schema::{Descriptor, GridPoint, Wgs84};
+use std::path::Path;
+
+/// Heights of a region that names none, metres: below the deepest cavern, above the highest mast.
+const HEIGHTS_M: [f64; 2] = [-10_000.0, 10_000.0];
+
+/// The box of `--bbox` and `--height`; `None` without a bbox.
+pub fn bbox(region: &Region, crs: Crs, is_wgs84: bool) -> Result<Option<BoxMm>, Failure> {
+    let heights = checked_heights(region)?;
+    let Some([west, south, east, north]) = region.bbox else {
+        return match region.height {
+            Some(_) => Err(Failure::usage("--height needs a region in plan; give --bbox, --polygon or --near")),
+            None => Ok(None),
+        };
+    };
+    for (low, high, axis) in [(west, east, "E0,E1"), (south, north, "N0,N1")] {
+        if low > high {
+            return Err(Failure::usage(format!(
+                "--bbox {axis}: {low} is above {high}; expected E0,N0,E1,N1 with E0 <= E1 and N0 <= N1"
+            )));
+        }
+    }
+    let corners = if is_wgs84 {
+        let corners = [(south, west), (south, east), (north, west), (north, east)];
+        corners.iter().map(|(lat, lon)| grid_point(crs, *lat, *lon)).collect::<Result<Vec<_>, _>>()?
+    } else {
+        vec![GridPoint::new(west, south, 0.0), GridPoint::new(east, north, 0.0)]
+    };
+    around(&corners, heights).map(Some)
+}
+
+/// Heights of the region, low first.
+pub fn checked_heights(region: &Region) -> Result<[f64; 2], Failure> {
+    let [low, high] = region.height.unwrap_or(HEIGHTS_M);
+    if low > high {
+        return Err(Failure::usage(format!("--height: {low} is above {high}; expected H0,H1 with H0 <= H1")));
+    }
+    Ok([low, high])
+}
+
+/// The box around points in plan between two heights.
+pub fn around(points: &[GridPoint], [low, high]: [f64; 2]) -> Result<BoxMm, Failure> {
+    let at = |height_m: f64| points.iter().map(move |point| GridPoint { height_m, ..*point });
+    Ok(BoxMm::around(at(low).chain(at(high)))?)
+}
+
+/// The grid point on the ground at a latitude and longitude, degrees.
+pub fn grid_point(crs: Crs, latitude_deg: f64, longitude_deg: f64) -> Result<GridPoint, Failure> {
+    Ok(crs.grid_from_latitude_longitude(latitude_deg, longitude_deg, 0.0)?)
+}
+
+/// WGS84 position of a grid point.
+pub fn wgs84(crs: Crs, point: GridPoint) -> Result<Wgs84, Failure> {
+    Ok(crs.wgs84_from_grid(point)?)
+}
+
+/// A shape in plan that features are asked against after their boxes.
+pub enum Shape {
+    /// A polygon with holes, grid metres.
+    Polygon(Polygon<f64>),
+    /// A circle, grid metres.
+    Circle {
+        /// Its centre.
+        centre: GridPoint,
+        /// Its radius, metres.
+        radius_m: f64,
+    },
+}
+
+impl Shape {
+    /// The polygon in a GeoJSON file: a geometry, a feature, or a collection with one feature.
+    pub fn read_polygon(path: &Path, crs: Crs, is_wgs84: bool) -> Result<Self, Failure> {
+        let place = path.display();
+        let text = std::fs::read_to_string(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        let document: GeoJson = text.parse().map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        let rings = match geometry(document) {
+            Some(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
+            _ => return Err(Failure::input(format!("{place}: expected one GeoJSON polygon"))),
+        };
+        let mut lines = Vec::new();
+        for ring in rings {
+            let coordinates = ring.iter().map(|position| match position.as_slice() {
+                [x, y, ..] if is_wgs84 => {
+                    grid_point(crs, *y, *x).map(|point| Coord { x: point.easting_m, y: point.northing_m })
+                }
+                [x, y, ..] => Ok(Coord { x: *x, y: *y }),
+                other => {
+                    Err(Failure::input(format!("{place}: expected positions of two numbers, found {}", other.len())))
+                }
+            });
+            lines.push(LineString(coordinates.collect::<Result<Vec<_>, _>>()?));
+        }
+        let outer = lines.remove(0);
+        Ok(Self::Polygon(Polygon::new(outer, lines)))
+    }
+
+    /// Points around it in plan.
+    pub fn outline(&self) -> Vec<GridPoint> {
+        match self {
+            Self::Polygon(polygon) => {
+                polygon.exterior().coords().map(|point| GridPoint::new(point.x, point.y, 0.0)).collect()
+            }
+            Self::Circle { centre, radius_m } => [-radius_m, *radius_m]
+                .iter()
+                .map(|reach| GridPoint::new(centre.easting_m + reach, centre.northing_m + reach, 0.0))
+                .collect(),
+        }
+    }
+
+    /// Whether the point lies in it, in plan.
+    pub fn contains(&self, point: &GridPoint) -> bool {
+        match self {
+            Self::Polygon(polygon) => polygon.contains(&Coord { x: point.easting_m, y: point.northing_m }),
+            Self::Circle { centre, radius_m } => centre.plan_distance_m(point) <= *radius_m,
+        }
+    }
+
+    /// Whether a descriptor belongs to it: its centre or ground contact, or one of its corners, lies in it.
+    pub fn holds(&self, descriptor: &Descriptor) -> bool {
+        let corners: &[GridPoint] = match descriptor {
+            Descriptor::Material(material) => &material.corners,
+            Descriptor::Dynamic(_) => &[],
+        };
+        self.contains(&descriptor.anchor()) || corners.iter().any(|corner| self.contains(corner))
+    }
+}
+
+fn geometry(document: GeoJson) -> Option<Geometry> {
+    match document {
+        GeoJson::Geometry(geometry) => Some(geometry.value),
+        GeoJson::Feature(feature) => feature.geometry.map(|geometry| geometry.value),
+        GeoJson::FeatureCollection(collection) => {
+            let mut features = collection.features.into_iter();
+            let only = features.next()?;
+            if features.next().is_some() { None } else { only.geometry.map(|geometry| geometry.value) }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Plugins and their settings as the command line chooses them.
+
+use crate::args::{PluginSearch, Settings};
+use crate::failure::Failure;
+use anyhow::anyhow;
+use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
+use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginInfo, Registry};
+use resurvey_core::version::PluginUse;
+use std::path::PathBuf;
+
+/// Colon-separated directories of plugin libraries.
+const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
+/// The file in the user's data directory with the SHA-256 of every library that may be loaded, one a line.
+const ALLOWED: &str = "allowed-plugins";
+
+/// Names in `--set NAME.KEY=VALUE` that are not plugins.
+const GATE: &str = "gate";
+const SEARCH: &str = "search";
+
+/// The built-in plugins and those in the directories of `search`.
+pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
+    let given = search.allow_plugin.iter().map(|text| text.parse::<Digest>());
+    let mut allowed = given.collect::<Result<Vec<_>, _>>().map_err(Failure::usage)?;
+    let data = data_directory();
+    if let Some(list) = data.as_ref().and_then(|data| std::fs::read_to_string(data.join(ALLOWED)).ok()) {
+        allowed.extend(list.lines().filter_map(|line| line.split_whitespace().next()?.parse::<Digest>().ok()));
+    }
+    let mut registry = Registry::new(allowed);
+    for declaration in [
+        resurvey_semantic::plugin(),
+        resurvey_skyline::plugin(),
+        resurvey_class_difference::plugin(),
+        resurvey_descriptors::plugin(),
+    ] {
+        registry.add_builtin(declaration)?;
+    }
+    let from_path = std::env::var_os(PLUGIN_PATH).map(|path| std::env::split_paths(&path).collect::<Vec<_>>());
+    let installed = data.map(|data| data.join("plugins")).filter(|directory| directory.is_dir());
+    for directory in search.plugin_dir.iter().cloned().chain(from_path.into_iter().flatten()).chain(installed) {
+        registry.add_directory(&directory);
+    }
+    Ok(registry)
+}
+
+/// Where this user's plugins are kept.
+fn data_directory() -> Option<PathBuf> {
+    let named = |key: &str| std::env::var_os(key).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let base = named("XDG_DATA_HOME").or_else(|| Some(named("HOME")?.join(".local/share")))?;
+    Some(base.join("resurvey"))
+}
+
+/// The `--set` and `--profile` of one run.
+pub struct Choices {
+    assignments: Vec<Assignment>,
+    profile: Option<String>,
+    /// Limits of the reliability gate.
+    pub gate: GateLimits,
+    /// Limits of the host-driven search.
+    pub search: SearchLimits,
+}
+
+impl Choices {
+    /// Reads `settings` for a run of the plugins called `names`.
+    pub fn read(settings: &Settings, names: &[&str]) -> Result<Self, Failure> {
+        let mut choices = Self {
+            assignments: Vec::new(),
+            profile: settings.profile.clone(),
+            gate: GateLimits::default(),
+            search: SearchLimits::default(),
+        };
+        for text in &settings.set {
+            let assignment: Assignment =
+                text.parse().map_err(|error| Failure::usage(format!("--set {text}: {error}")))?;
+            match assignment.plugin.as_str() {
+                GATE => choices.set_gate(&assignment)?,
+                SEARCH => choices.set_search(&assignment)?,
+                name if names.contains(&name) => choices.assignments.push(assignment),
+                name => {
+                    let used = names.join(", ");
+                    return Err(Failure::usage(format!(
+                        "--set {text}: this run does not use {name:?}; it uses {used}, {GATE} and {SEARCH}"
+                    )));
+                }
+            }
+        }
+        Ok(choices)
+    }
+
+    fn set_gate(&mut self, assignment: &Assignment) -> Result<(), Failure> {
+        let value = number(assignment)?;
+        if self.gate.set(&assignment.key, value) {
+            return Ok(());
+        }
+        let (key, known) = (&assignment.key, GATE_KEYS.join(", "));
+        Err(Failure::usage(format!("gate has no setting {key:?}; it has {known}")))
+    }
+
+    fn set_search(&mut self, assignment: &Assignment) -> Result<(), Failure> {
+        let value = number(assignment)?;
+        match assignment.key.as_str() {
+            "radius_m" if (0.0..=500.0).contains(&value) => self.search.radius_m = value,
+            "yaw_range_deg" if (0.0..=180.0).contains(&value) => self.search.yaw_range_deg = value,
+            key => {
+                let expected = "radius_m (0 to 500) and yaw_range_deg (0 to 180)";
+                return Err(Failure::usage(format!("search.{key}={value}: expected {expected}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// `plugin` with its settings, and how the evidence records it.
+    pub fn tool(&self, plugin: &Plugin) -> Result<Tool, Failure> {
+        let info = plugin.info();
+        let own = self.assignments.iter().filter(|assignment| assignment.plugin == info.name);
+        let mut given: Vec<(&str, &str)> =
+            own.map(|assignment| (assignment.key.as_str(), assignment.value.as_str())).collect();
+        if let Some(profile) = &self.profile
+            && plugin.schema().iter().any(|(key, _)| key == "profile")
+            && !given.iter().any(|(key, _)| *key == "profile")
+        {
+            given.push(("profile", profile));
+        }
+        let settings = plugin.settings(given)?;
+        Ok(Tool { plugin: plugin.clone(), settings })
+    }
+}
+
+fn number(assignment: &Assignment) -> Result<f64, Failure> {
+    let Assignment { plugin, key, value } = assignment;
+    let parsed = value.parse::<f64>().ok().filter(|number| number.is_finite());
+    parsed.ok_or_else(|| Failure::usage(format!("--set {plugin}.{key}={value}: expected a number")))
+}
+
+/// A plugin with the settings of this run.
+pub struct Tool {
+    /// The plugin.
+    pub plugin: Plugin,
+    /// Complete settings.
+    pub settings: resurvey_core::plugin::Settings,
+}
+
+impl Tool {
+    /// How the evidence records it.
+    pub fn used(&self) -> Result<PluginUse, Failure> {
+        let info: &PluginInfo = self.plugin.info();
+        Ok(PluginUse {
+            kind: info.kind.to_string(),
+            name: info.name.clone(),
+            version: info.version.clone(),
+            sha256: Some(resurvey_core::version::Digest(info.sha256.bytes())),
+            settings: serde_json::from_str(self.settings.as_json()).map_err(|error| {
+                Failure::new(crate::failure::INTERNAL, anyhow!("settings of {}: {error}", info.name))
+            })?,
+        })
+    }
+}
