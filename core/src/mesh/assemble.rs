@@ -53,7 +53,7 @@ impl Assembled {
         origin: GridPoint,
     ) -> Result<(), ImportError> {
         let part = Checked::new(part, placement)?;
-        let Some((shift, offsets)) = part.offsets()? else {
+        let Some(Offsets { shift, offsets }) = part.offsets()? else {
             self.empty_objects += 1;
             return Ok(());
         };
@@ -137,6 +137,14 @@ struct Checked {
     triangle_materials: Vec<usize>,
 }
 
+/// Vertices around a near origin.
+struct Offsets {
+    /// From the model's origin to the near one, whole metres.
+    shift: [f64; 3],
+    /// One per vertex; meaningless where no face uses it.
+    offsets: Vec<[f32; 3]>,
+}
+
 impl Checked {
     fn new(part: Part, placement: &Placement) -> Result<Self, ImportError> {
         let Part { name, mut vertices, uvs, triangles, triangle_materials } = part;
@@ -161,7 +169,7 @@ impl Checked {
     }
 
     /// The middle of the used vertices in whole metres, and every vertex relative to it; `None` without used vertices.
-    fn offsets(&self) -> Result<Option<([f64; 3], Vec<[f32; 3]>)>, ImportError> {
+    fn offsets(&self) -> Result<Option<Offsets>, ImportError> {
         let used = || self.vertices.iter().zip(&self.is_used).filter(|(_, used)| **used).map(|(vertex, _)| *vertex);
         let (mut low, mut high) = match used().next() {
             Some(first) => (first, first),
@@ -181,7 +189,7 @@ impl Checked {
             return Err(ImportError::ObjectTooLarge { object: self.name.clone(), size_m, limit_m: 2.0 * MAX_OFFSET_M });
         }
         let offset = |vertex: &[f64; 3]| std::array::from_fn(|axis| (vertex[axis] - middle[axis]) as f32);
-        Ok(Some((middle, self.vertices.iter().map(offset).collect())))
+        Ok(Some(Offsets { shift: middle, offsets: self.vertices.iter().map(offset).collect() }))
     }
 
     /// Fills `mesh` with the kept faces and only the vertices that they use, in the order of the file.

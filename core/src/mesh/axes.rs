@@ -57,6 +57,7 @@ impl Placement {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "swaps, signs and quarter turns are exact")]
 mod tests {
     use super::*;
 

@@ -59,7 +59,7 @@ pub(super) fn read_gltf(bytes: &[u8], neighbours: &Neighbours) -> Result<Model, 
         face_count: 0,
         coarse: None,
     };
-    let parts = placed_meshes(&root)?.into_iter().map(|placed| reading.part(placed)).collect::<Result<_, _>>()?;
+    let parts = placed_meshes(&root)?.iter().map(|placed| reading.part(placed)).collect::<Result<_, _>>()?;
     warnings.extend(reading.coarse);
     Ok(Model {
         format: "glTF",
@@ -168,7 +168,7 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn part(&mut self, placed: Placed) -> Result<Part, ImportError> {
+    fn part(&mut self, placed: &Placed) -> Result<Part, ImportError> {
         let mesh = self.root.meshes.get(placed.mesh);
         let mesh = mesh.ok_or_else(|| damaged(format!("nodes[{}]", placed.node), "there is no such mesh"))?;
         let name = self.root.nodes[placed.node].name.clone().or_else(|| mesh.name.clone());

@@ -27,4 +27,5 @@ pub use import_error::ImportError;
 pub use surface::{LabelTexture, Mesh, Object, Surface, Wrap};
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "the numbers in the files built here are exact in binary")]
 mod tests;
