@@ -8,8 +8,8 @@ use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
 use super::rows::{VersionRow, check_classes, classes_at, head, insert_classes};
 use crate::version::{
-    BoxMm, Counts, Delta, FeatureState, Fid, InvalidState, Operations, UpdateTransaction, VersionId, VersionKind,
-    VersionRecord, version_hash,
+    BoxMm, Counts, Delta, Digest, FeatureState, Fid, InvalidState, Operations, UpdateTransaction, VersionId,
+    VersionKind, VersionRecord, version_hash,
 };
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
@@ -28,7 +28,17 @@ impl MapFile {
     /// The version's time is `now`, or that of the version before where the clock went back.
     pub fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
         let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
-        self.write(|connection| commit(connection, transaction, evidence.as_ref(), now))
+        let digest = evidence.as_ref().map(|evidence| evidence.digest);
+        self.write(|connection| {
+            if let Some(made) = made_before(connection, transaction)? {
+                return Ok(made);
+            }
+            let record = make_version(connection, transaction, digest, now)?;
+            if let Some(evidence) = evidence {
+                evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
+            }
+            Ok(record.version)
+        })
     }
 }
 
@@ -44,15 +54,13 @@ pub(super) struct Plan {
     pub(super) envelope: Option<BoxMm>,
 }
 
-fn commit(
+/// Writes the next version, all but the row of its evidence.
+pub(super) fn make_version(
     connection: &Connection,
     transaction: &UpdateTransaction,
-    evidence: Option<&Evidence>,
+    evidence: Option<Digest>,
     now: Timestamp,
-) -> Result<VersionId, Refused> {
-    if let Some(made) = made_before(connection, transaction)? {
-        return Ok(made);
-    }
+) -> Result<VersionRecord, Refused> {
     let head = head(connection)?;
     check_request(transaction, &head)?;
     let classes = check_new_classes(connection, transaction, head.version)?;
@@ -63,7 +71,6 @@ fn commit(
 
     let mut operations = Operations::start(None, transaction.classes.as_ref(), plan.deltas.len() as u64);
     plan.deltas.iter().for_each(|delta| operations.add(delta));
-    let evidence_digest = evidence.map(|evidence| evidence.digest);
     let record = VersionRecord {
         version: VersionId(head.version.0 + 1),
         kind: transaction.kind,
@@ -76,8 +83,8 @@ fn commit(
         counts: Counts::of(&plan.deltas),
         envelope: plan.envelope,
         idempotency_key: transaction.idempotency_key.clone(),
-        evidence: evidence_digest,
-        hash: version_hash(Some(head.hash), operations.finish(), evidence_digest),
+        evidence,
+        hash: version_hash(Some(head.hash), operations.finish(), evidence),
     };
     VersionRow::insert(connection, &record)?;
     if let Some(classes) = &transaction.classes {
@@ -85,10 +92,7 @@ fn commit(
     }
     insert_geometries(connection, transaction)?;
     write_rows(connection, &plan, record.version)?;
-    if let Some(evidence) = evidence {
-        evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
-    }
-    Ok(record.version)
+    Ok(record)
 }
 
 /// The version that the same idempotency key made before.
@@ -100,7 +104,7 @@ fn made_before(connection: &Connection, transaction: &UpdateTransaction) -> Resu
     Ok(made.map(|version| VersionId(version.unsigned_abs())))
 }
 
-fn check_request(transaction: &UpdateTransaction, head: &VersionRecord) -> Result<(), Refused> {
+pub(super) fn check_request(transaction: &UpdateTransaction, head: &VersionRecord) -> Result<(), Refused> {
     for version in [Some(transaction.base), transaction.reverts].into_iter().flatten() {
         if version > head.version {
             return refuse(StoreError::NoSuchVersion { version, head: head.version }.into());
@@ -143,7 +147,7 @@ fn check_new_classes(
     }
 }
 
-fn check_states(transaction: &UpdateTransaction, classes: &ClassTable) -> Result<(), Refused> {
+pub(super) fn check_states(transaction: &UpdateTransaction, classes: &ClassTable) -> Result<(), Refused> {
     let invalid = |feature: String| move |error| WriteFault::Refused(CommitError::State { feature, error });
     for (position, state) in transaction.additions.iter().enumerate() {
         state.validate(classes).map_err(invalid(format!("addition {position}")))?;

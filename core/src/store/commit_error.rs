@@ -79,6 +79,12 @@ pub enum CommitError {
         /// Its name in the old table.
         class: String,
     },
+    /// Something else than descriptors in a proposal.
+    #[error("a proposal changes descriptors only; {found} cannot wait for review")]
+    NotProposable {
+        /// What it changes as well.
+        found: &'static str,
+    },
     /// The file.
     #[error(transparent)]
     Store(#[from] StoreError),

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Value of `format` in the table `meta`.
-const FORMAT: &str = "resurvey.map/1";
+pub(super) const FORMAT: &str = "resurvey.map/1";
 /// How long a writer waits for another.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Page cache of a connection, KiB.

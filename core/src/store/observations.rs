@@ -2,7 +2,7 @@
 
 use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
-use super::rows::timestamp;
+use super::rows::{digest, timestamp};
 use super::snapshot::check_version;
 use crate::version::{Digest, Observation, VersionId};
 use jiff::Timestamp;
@@ -141,4 +141,17 @@ fn insert_label_image(connection: &Connection, image: &[u8]) -> Result<Digest, F
     let digest = Digest::of(image);
     connection.prepare_cached(SQL)?.execute(named_params! {":digest": digest.0, ":bytes": image})?;
     Ok(digest)
+}
+
+/// Digest of the observation numbered `id`.
+pub(super) fn digest_of(connection: &Connection, id: u64) -> Result<Digest, Fault> {
+    const SQL: &str = "SELECT digest FROM observation WHERE id = :id ORDER BY id";
+    Ok(connection.prepare_cached(SQL)?.query_row(named_params! {":id": id as i64}, |row| digest(row, "digest"))?)
+}
+
+/// Says that the observation numbered `id`, which made no version so far, made `version`.
+pub(super) fn link(connection: &Connection, id: u64, version: VersionId) -> Result<(), Fault> {
+    const SQL: &str = "UPDATE observation SET version = :version WHERE id = :id AND version IS NULL";
+    connection.prepare_cached(SQL)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    Ok(())
 }

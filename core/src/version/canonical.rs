@@ -229,3 +229,98 @@ impl<'b> Reader<'b> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = f64> {
+        prop_oneof![Just(0.0), Just(-0.0), -1e9..1e9_f64, Just(f64::MIN_POSITIVE), Just(836_694.05)]
+    }
+
+    fn sigma() -> impl Strategy<Value = Option<Uncertainty>> {
+        let sigma = (number(), proptest::option::of(number()), proptest::option::of(number()));
+        proptest::option::of(sigma.prop_map(|(position_m, size_m, area_m2)| Uncertainty {
+            position_m,
+            size_m,
+            area_m2,
+        }))
+    }
+
+    fn state() -> impl Strategy<Value = FeatureState> {
+        let three = || [number(), number(), number()];
+        let material = (any::<u8>(), [three(), three(), three(), three()], three(), sigma());
+        let dynamic = (any::<u8>(), three(), three(), proptest::option::of(number()), sigma());
+        let object = (".*", any::<[u8; 32]>(), proptest::array::uniform6(-1_000_000_i64..1_000_000));
+        prop_oneof![
+            material.prop_map(|(class, corners, normal, sigma)| {
+                let corners = corners.map(GridPoint::from);
+                FeatureState::Descriptor(Descriptor::Material(MaterialDescriptor {
+                    class: ClassId(class),
+                    corners,
+                    normal,
+                    sigma,
+                }))
+            }),
+            dynamic.prop_map(|(class, position, size_m, yaw_rad, sigma)| {
+                FeatureState::Descriptor(Descriptor::Dynamic(DynamicDescriptor {
+                    class: ClassId(class),
+                    position: position.into(),
+                    size_m,
+                    yaw_rad,
+                    sigma,
+                }))
+            }),
+            object.prop_map(|(name, digest, [e, n, h, de, dn, dh])| FeatureState::Object {
+                name,
+                geometry: Digest(digest),
+                bounds: BoxMm::from_mm([e, n, h], [e + de.abs(), n + dn.abs(), h + dh.abs()]).unwrap(),
+            }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn a_state_comes_back_from_its_bytes_and_has_no_others(state in state()) {
+            let bytes = state.to_bytes();
+            let back = FeatureState::from_bytes(&bytes).unwrap();
+            prop_assert_eq!(&back, &state);
+            prop_assert_eq!(back.to_bytes(), bytes);
+        }
+
+        #[test]
+        fn bytes_cut_short_or_run_on_are_refused(state in state(), cut in any::<proptest::sample::Index>()) {
+            let mut bytes = state.to_bytes();
+            prop_assert!(FeatureState::from_bytes(&bytes[..cut.index(bytes.len())]).is_err());
+            bytes.push(0);
+            prop_assert!(FeatureState::from_bytes(&bytes).is_err());
+        }
+
+        #[test]
+        fn any_bytes_are_read_without_a_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..200), kind in 0_u8..5) {
+            if let Some(first) = bytes.first_mut() {
+                *first = kind;
+            }
+            if let Ok(state) = FeatureState::from_bytes(&bytes) {
+                prop_assert_eq!(FeatureState::from_bytes(&state.to_bytes()), Ok(state));
+            }
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_a_chair_are_those_of_the_format_page() {
+        let chair = FeatureState::Descriptor(Descriptor::Dynamic(DynamicDescriptor {
+            class: ClassId(5),
+            position: GridPoint::new(1.0, -0.0, 2.0),
+            size_m: [0.5, 0.5, 1.0],
+            yaw_rad: Some(1.0),
+            sigma: None,
+        }));
+        // python3: struct.pack("<3B7d", 2, 5, 8, 1, 0, 2, .5, .5, 1, 1).hex()
+        let expected = "020508000000000000f03f00000000000000000000000000000040000000000000e03f000000000000e03f\
+            000000000000f03f000000000000f03f";
+        let bytes: String = chair.to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(bytes, expected);
+    }
+}

@@ -170,3 +170,93 @@ fn delta_to_line(delta: &Delta, classes: &ClassTable) -> Option<ChangeLine> {
     };
     Some(ChangeLine { op, fid: Some(delta.fid().0), before, after })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use resurvey_schema::{Descriptor, GridPoint};
+
+    const HEADER: &str = r#"{"format":"resurvey.changes/1","base_version":3,"author":"survey","message":"m"}"#;
+    const CHAIR: &str = r#"{"class":"chair","position":[836716.9865,818429.4205,7.2]}"#;
+
+    fn read(lines: &str) -> Result<ChangeSet, ChangeSetError> {
+        read_change_set(&format!("{HEADER}\n{lines}\n"), &ClassTable::default())
+    }
+
+    #[test]
+    fn a_change_set_comes_back_as_it_was_written() {
+        let set = read(&format!(
+            "{{\"op\":\"add\",\"fid\":4,\"after\":{CHAIR}}}\n\n{{\"op\":\"remove\",\"fid\":5,\"before\":{CHAIR}}}"
+        ))
+        .unwrap();
+        assert_eq!((set.base, set.deltas.len()), (Some(VersionId(3)), 2));
+        let header = ChangeSetHeader {
+            format: FORMAT.to_owned(),
+            base_version: Some(3),
+            author: set.author.clone(),
+            message: set.message.clone(),
+        };
+        let (text, left_out) = write_change_set(&header, &set.deltas, &ClassTable::default()).unwrap();
+        assert_eq!((read_change_set(&text, &ClassTable::default()), left_out), (Ok(set), vec![]));
+    }
+
+    #[test]
+    fn an_object_is_left_out_and_named() {
+        let bounds = crate::version::BoxMm::from_mm([0; 3], [1; 3]).unwrap();
+        let geometry = crate::version::Digest::of(b"");
+        let tower = FeatureState::Object { name: "tower".to_owned(), geometry, bounds };
+        let header = serde_json::from_str(HEADER).unwrap();
+        let deltas = [Delta::add(Fid(7), tower)];
+        let (text, left_out) = write_change_set(&header, &deltas, &ClassTable::default()).unwrap();
+        assert_eq!((text.lines().count(), left_out), (1, vec![Fid(7)]));
+    }
+
+    #[test]
+    fn a_bad_line_is_refused_by_its_number() {
+        for (lines, expected) in [
+            (r#"{"op":"add"}"#, "line 2: Add needs \"after\" and no \"before\""),
+            (r#"{"op":"shift"}"#, "line 2: unknown variant `shift`"),
+            (r#"{"op":"add","aftr":1}"#, "line 2: unknown field `aftr`"),
+            (r#"{"op":"add","fid":0}"#, "line 2: fid 0 is not between 1 and 9007199254740991"),
+            (&format!(r#"{{"op":"remove","before":{CHAIR}}}"#), "line 2: Remove needs \"fid\""),
+            (&format!(r#"{{"op":"modify","fid":1,"after":{CHAIR}}}"#), "line 2: Modify needs"),
+            (
+                &format!("\n{{\"op\":\"add\",\"after\":{}}}", CHAIR.replace("chair", "sofa")),
+                "line 3, after: class \"sofa\"",
+            ),
+            ("{", "line 2: EOF"),
+        ] {
+            let found = read(lines).unwrap_err().to_string();
+            assert!(found.starts_with(expected), "{lines}\nexpected {expected}\nfound {found}");
+        }
+        let classes = ClassTable::default();
+        assert_eq!(read_change_set(" \n", &classes), Err(ChangeSetError::Empty));
+        let other = HEADER.replace("changes/1", "changes/2");
+        assert_eq!(read_change_set(&other, &classes), Err(ChangeSetError::Format("resurvey.changes/2".to_owned())));
+    }
+
+    #[test]
+    fn the_change_sets_of_the_cases_are_read() {
+        let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
+        let shared = std::env::var("RESURVEY_SHARED").unwrap_or_else(|_| beside.to_owned());
+        for (case, first) in [
+            ("street-banner-removed", GridPoint::new(835_567.743_1, 817_816.210_8, 8.129_6)),
+            ("library-chair-removed", GridPoint::new(836_716.986_5, 818_429.420_5, 7.2)),
+        ] {
+            let path = format!("{shared}/cases/{case}/base.changes.jsonl");
+            let Ok(text) = std::fs::read_to_string(&path) else {
+                eprintln!("SKIPPED {case}: {path} is not there");
+                continue;
+            };
+            let set = read_change_set(&text, &ClassTable::default()).unwrap();
+            assert_eq!((set.base, set.author.as_deref()), (None, Some("survey")));
+            let found = match &set.additions[0] {
+                FeatureState::Descriptor(Descriptor::Material(material)) => material.corners[0],
+                FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => dynamic.position,
+                FeatureState::Object { .. } => panic!(),
+            };
+            assert_eq!(found, first);
+            assert_eq!(set.into_transaction(VersionId(9)).base, VersionId(9));
+        }
+    }
+}

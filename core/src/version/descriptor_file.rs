@@ -155,3 +155,127 @@ fn normal_from_file(file: &DescriptorFile, corners: &[GridPoint; 4]) -> Result<[
     }
     Ok(given)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(json: &str) -> Result<Descriptor, InvalidDescriptor> {
+        descriptor_from_file(&serde_json::from_str(json).unwrap(), &ClassTable::default())
+    }
+
+    fn message(json: &str) -> String {
+        read(json).unwrap_err().to_string()
+    }
+
+    // From the case street-banner-removed: 9.6312 × 6.8852 m on a wall that faces east.
+    const CORNERS: &str = "[[835567.7431,817816.2108,8.1296],[835567.7431,817825.842,8.1296],\
+        [835567.7431,817825.842,15.0148],[835567.7431,817816.2108,15.0148]]";
+
+    #[test]
+    fn a_banner_needs_only_its_class_and_corners() {
+        let Ok(Descriptor::Material(banner)) = read(&format!(r#"{{"class":"banner","corners":{CORNERS}}}"#)) else {
+            panic!()
+        };
+        assert!((Vector3::from(banner.normal) - Vector3::x()).norm() < 1e-12);
+        let file = descriptor_to_file(&Descriptor::Material(banner), &ClassTable::default());
+        // 817825.842 − 817816.2108 and 15.0148 − 8.1296.
+        let near = |value: Option<f64>, expected: f64| (value.unwrap() - expected).abs() < 1e-6;
+        assert!(near(file.width_m, 9.6312) && near(file.height_m, 6.8852) && near(file.area_m2, 9.6312 * 6.8852));
+        let centre = file.centre.unwrap();
+        assert!((centre.northing_m - 817_821.026_4).abs() < 1e-6 && (centre.height_m - 11.572_2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_chair_needs_only_its_class_and_position_and_has_the_size_of_its_class() {
+        let Ok(Descriptor::Dynamic(chair)) = read(r#"{"class":"chair","position":[836716.9865,818429.4205,7.2]}"#)
+        else {
+            panic!()
+        };
+        assert_eq!((chair.size_m, chair.yaw_rad, chair.sigma), ([0.5, 0.5, 0.9], None, None));
+    }
+
+    #[test]
+    fn a_3_4_5_triangle_has_area_6() {
+        let at = |x, y| Point3::new(x, y, 0.0);
+        assert!((quad_area_m2([at(0.0, 0.0), at(3.0, 0.0), at(0.0, 4.0), at(0.0, 0.0)]) - 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_no_descriptor_is_refused_by_name() {
+        let banner = |corners: &str| format!(r#"{{"class":"banner","corners":{corners}}}"#);
+        let clockwise = "[[0,0,0],[0,0,2],[0,3,2],[0,3,0]]";
+        let inward = format!(r#"{{"class":"banner","corners":{CORNERS},"normal":[-1,0,0]}}"#);
+        for (json, expected) in [
+            (
+                r#"{"class":"poster","position":[0,0,0]}"#.to_owned(),
+                "class \"poster\" is not in the map's class table; expected one of stone, ",
+            ),
+            (
+                r#"{"class":"chair"}"#.to_owned(),
+                "expected either \"corners\" (material) or \"position\" (dynamic), found neither",
+            ),
+            (
+                r#"{"class":"banner","position":[0,0,0],"size_m":[1,1,1]}"#.to_owned(),
+                "class \"banner\" is Material; a Dynamic descriptor",
+            ),
+            (r#"{"class":"banner","position":[0,0,0]}"#.to_owned(), "class \"banner\" has no predefined size"),
+            (banner("[[0,0,0],[0,3,0],[0,3,2],[0,0,2]]").replace("banner", "sky"), "class \"sky\" is Ignored"),
+            (inward, "corner 0 (of 0…3) does not turn left"),
+            (banner("[[0,0,0],[0,3,0],[0,0,2],[0,3,2]]"), "corner 0"),
+            (banner("[[0,0,0],[0,0,0],[0,0,0],[0,0,0]]"), "corner 0"),
+            (banner("[[0,0,0],[0,3,0],[1,3,2],[0,0,2]]"), "corner 0 (of 0…3) is 0.2"),
+            (banner("[[0,0,1e12],[0,3,0],[0,3,2],[0,0,2]]"), "height 1000000000000 m is not within"),
+            (
+                r#"{"class":"chair","position":[0,0,0],"size_m":[0,1,1]}"#.to_owned(),
+                "size_m is 0; expected a finite number above zero",
+            ),
+            (r#"{"class":"chair","position":[0,0,0],"sigma_size_m":1}"#.to_owned(), "\"sigma_size_m\" and"),
+            (
+                r#"{"class":"chair","position":[0,0,0],"normal":[1,0,0]}"#.to_owned(),
+                "\"normal\" does not belong to a dynamic",
+            ),
+        ] {
+            let found = message(&json);
+            assert!(found.contains(expected), "{json}\nexpected {expected}\nfound {found}");
+        }
+        // Clockwise from below faces the other way, which is a banner too.
+        let Ok(Descriptor::Material(west)) = read(&banner(clockwise)) else { panic!() };
+        assert!((Vector3::from(west.normal) + Vector3::x()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_rounded_normal_is_made_a_unit_normal() {
+        let json = r#"{"class":"banner","corners":[[0,0,0],[-3,3,0],[-3,3,2],[0,0,2]],"normal":[0.7071,0.7071,0]}"#;
+        let Ok(Descriptor::Material(banner)) = read(json) else { panic!() };
+        assert!((Vector3::from(banner.normal).norm() - 1.0).abs() < 1e-12);
+        assert!(message(&json.replace("0.7071", "0.6")).contains("the normal has length 0.848"));
+    }
+
+    proptest! {
+        #[test]
+        fn a_descriptor_comes_back_from_json_to_the_last_bit(
+            e in 8e5..9e5_f64, n in 8e5..9e5_f64, h in -10.0..900.0_f64, yaw in 0.0..6.2_f64,
+            width in 0.1..30.0_f64, height in 0.1..30.0_f64, sigma in 0.0..5.0_f64,
+        ) {
+            let classes = ClassTable::default();
+            let (along_e, along_n) = (yaw.cos() * width, yaw.sin() * width);
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, height), (0.0, height)]
+                .map(|(share, up)| GridPoint::new(e + share * along_e, n + share * along_n, h + up));
+            let normal = quad_normal(&points(&corners)).unwrap().into();
+            let sigma = Some(Uncertainty { position_m: sigma, size_m: Some(sigma / 3.0), area_m2: None });
+            let class = classes.by_name("banner").unwrap().index;
+            let banner = Descriptor::Material(MaterialDescriptor { class, corners, normal, sigma });
+            let class = classes.by_name("chair").unwrap().index;
+            let (position, size_m) = (corners[0], [0.5, 0.5, 0.9]);
+            let chair = Descriptor::Dynamic(DynamicDescriptor { class, position, size_m, yaw_rad: Some(yaw), sigma });
+            for descriptor in [banner, chair] {
+                let json = serde_json::to_string(&descriptor_to_file(&descriptor, &classes)).unwrap();
+                let back = descriptor_from_file(&serde_json::from_str(&json).unwrap(), &classes).unwrap();
+                let (back, descriptor) = (FeatureState::Descriptor(back), FeatureState::Descriptor(descriptor));
+                prop_assert!(back.is_same_as(&descriptor), "{back:?} {descriptor:?}");
+            }
+        }
+    }
+}

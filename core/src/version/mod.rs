@@ -23,6 +23,7 @@ pub use digest::{Digest, InvalidDigest};
 pub use feature_state::{FeatureState, InvalidState};
 pub use observation::{Decision, Gate, LocalizationEvidence, Observation, PluginUse};
 pub use operations::{Frame, Operations, version_hash};
+pub(crate) use operations::{proposal_bytes, read_proposal_bytes};
 pub use record::{Feature, VersionRecord};
 pub(crate) use revision::is_tag_name;
 pub use revision::{InvalidRevision, Revision};

@@ -1,6 +1,8 @@
 //! Tests of the store through its public door, and the maps they start from.
 
 mod commit;
+mod fsck;
+mod history;
 mod open;
 
 use super::{CommitError, MapFile, NewMap};

@@ -1,0 +1,154 @@
+//! Features: their states, life spans, index and geometry.
+
+use super::problem::Findings;
+use crate::store::error::Fault;
+use crate::store::index::{IndexOrigin, LIVE};
+use crate::store::rows::classes_at;
+use crate::version::{Digest, FeatureState, VersionId};
+use resurvey_schema::ClassTable;
+use rusqlite::{Connection, Row};
+use std::collections::BTreeMap;
+
+fn state(row: &Row, column: &str) -> Result<Result<FeatureState, String>, Fault> {
+    let bytes = row.get_ref(column)?.as_blob().map_err(rusqlite::Error::from)?;
+    Ok(match FeatureState::from_bytes(bytes) {
+        Ok(state) if state.to_bytes() == bytes => Ok(state),
+        Ok(_) => Err("the state is not in its canonical form".to_owned()),
+        Err(error) => Err(format!("the state cannot be read: {error}")),
+    })
+}
+
+/// Every state is canonical, fits the classes of its version, and agrees with the columns made from it.
+pub(super) fn states(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
+    const SQL: &str = "SELECT id, fid, from_version, kind, class, geometry, state FROM feature_version ORDER BY id";
+    let tables = class_tables(connection)?;
+    let mut statement = connection.prepare(SQL)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let (fid, from): (i64, i64) = (row.get("fid")?, row.get("from_version")?);
+        let place = || format!("feature {fid} from version {from}");
+        let state = match state(row, "state")? {
+            Ok(state) => state,
+            Err(detail) => {
+                findings.add(place(), detail);
+                continue;
+            }
+        };
+        let columns: (String, Option<u8>, Option<[u8; 32]>) =
+            (row.get("kind")?, row.get("class")?, row.get("geometry")?);
+        let made =
+            (state.kind_name().to_owned(), state.class().map(|class| class.0), state.geometry().map(|digest| digest.0));
+        if columns != made {
+            findings.add(place(), "kind, class or geometry differ from the state");
+        }
+        let Some((_, classes)) = tables.range(..=from).next_back() else { continue };
+        if let Err(error) = state.validate(classes) {
+            findings.add(place(), error.to_string());
+        }
+    }
+    Ok(())
+}
+
+fn class_tables(connection: &Connection) -> Result<BTreeMap<i64, ClassTable>, Fault> {
+    let mut statement = connection.prepare("SELECT DISTINCT from_version FROM class ORDER BY from_version")?;
+    let mut rows = statement.query([])?;
+    let mut tables = BTreeMap::new();
+    while let Some(row) = rows.next()? {
+        let from: i64 = row.get(0)?;
+        // A table that cannot be read is found by the check of the classes.
+        if let Ok(classes) = classes_at(connection, VersionId(from.unsigned_abs())) {
+            tables.insert(from, classes);
+        }
+    }
+    Ok(tables)
+}
+
+/// The life spans of a feature do not overlap, so that it has one open row at most.
+pub(super) fn life_spans(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
+    const SQL: &str = "SELECT fid, from_version, to_version FROM feature_version ORDER BY fid, from_version";
+    let mut statement = connection.prepare(SQL)?;
+    let mut rows = statement.query([])?;
+    let mut last: Option<(i64, i64, Option<i64>)> = None;
+    while let Some(row) = rows.next()? {
+        let (fid, from, to): (i64, i64, Option<i64>) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        if let Some((last_fid, last_from, last_to)) = last
+            && last_fid == fid
+            && last_to.is_none_or(|last_to| last_to > from)
+        {
+            let end = last_to.map_or("open".to_owned(), |to| format!("until {to}"));
+            findings.add(
+                format!("feature {fid} from version {from}"),
+                format!("overlaps the state from version {last_from}, {end}"),
+            );
+        }
+        last = Some((fid, from, to));
+    }
+    Ok(())
+}
+
+/// The R*Tree holds the box and the versions of every row, and nothing else.
+pub(super) fn index(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
+    const ROWS: &str = "SELECT f.id, f.fid, f.from_version, f.to_version, f.state,
+            i.id, i.e0, i.e1, i.n0, i.n1, i.h0, i.h1, i.v0, i.v1
+        FROM feature_version AS f LEFT JOIN feature_index AS i ON i.id = f.id ORDER BY f.id";
+    const STRAYS: &str = "SELECT i.id FROM feature_index AS i LEFT JOIN feature_version AS f ON f.id = i.id
+        WHERE f.id IS NULL ORDER BY i.id";
+    let origin = IndexOrigin::read(connection)?;
+    let mut statement = connection.prepare(ROWS)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let (fid, from, to): (i64, i64, Option<i64>) = (row.get(1)?, row.get(2)?, row.get(3)?);
+        let place = || format!("feature {fid} from version {from}");
+        if row.get::<_, Option<i64>>(5)?.is_none() {
+            findings.add(place(), "is not in the index");
+            continue;
+        }
+        let mut found = [0; 8];
+        for (column, value) in found.iter_mut().enumerate() {
+            *value = row.get(6 + column)?;
+        }
+        let Ok(state) = state(row, "state")? else { continue };
+        let ends = state.bounds().ok().and_then(|bounds| origin?.to_index(&bounds));
+        let expected =
+            ends.map(|[e0, e1, n0, n1, h0, h1]| [e0, e1, n0, n1, h0, h1, from, to.map_or(LIVE, |to| to - 1)]);
+        if expected != Some(found) {
+            findings.add(place(), format!("the index has {found:?}, expected {expected:?}"));
+        }
+    }
+    let mut statement = connection.prepare(STRAYS)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        findings.add(format!("index row {}", row.get::<_, i64>(0)?), "belongs to no feature");
+    }
+    Ok(())
+}
+
+/// Geometry is what its digest says, and some object uses it.
+pub(super) fn geometry(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
+    const SQL: &str = "SELECT digest, bytes, EXISTS (SELECT 1 FROM feature_version AS f WHERE f.geometry = g.digest
+            AND f.geometry IS NOT NULL) AS is_used FROM geometry AS g ORDER BY rowid";
+    each_blob(connection, SQL, "geometry", "no object uses it", findings)
+}
+
+/// Checks rows (digest, bytes, is_used).
+pub(super) fn each_blob(
+    connection: &Connection,
+    sql: &str,
+    name: &str,
+    unused: &str,
+    findings: &mut Findings,
+) -> Result<(), Fault> {
+    let mut statement = connection.prepare(sql)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let digest = Digest(row.get(0)?);
+        let found = Digest::of(row.get_ref(1)?.as_blob().map_err(rusqlite::Error::from)?);
+        if found != digest {
+            findings.add(format!("{name} {digest}"), format!("its bytes have digest {found}"));
+        }
+        if !row.get::<_, bool>(2)? {
+            findings.add(format!("{name} {digest}"), unused);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,9 @@
+//! What must hold in a map file, checked from outside the code that writes it.
+
+mod evidence;
+mod features;
+mod file;
+mod history;
+mod problem;
+
+pub use problem::Problem;

@@ -1,0 +1,206 @@
+//! Damage, made with raw SQL behind the store's back, and what `fsck` says of it.
+
+use super::*;
+use crate::version::{BoxMm, Decision, Delta, Digest, Observation};
+use rusqlite::Connection;
+
+/// Two objects that share geometry, a banner that moved, a chair that left, evidence with a label image, a tag, a
+/// proposal, a new class.
+fn eventful() -> Scratch {
+    let scratch = Scratch::with_two_features();
+    let bounds = BoxMm::from_mm([835_567_000, 817_816_000, 0], [835_600_000, 817_830_000, 30_000]).unwrap();
+    let mut import = transaction(1);
+    let geometry = import.add_geometry(b"a mesh".to_vec());
+    let tower = |name: &str| FeatureState::Object { name: name.to_owned(), geometry, bounds };
+    import.additions = vec![tower("tower"), tower("annexe")];
+    scratch.map.commit(&import, at(2)).unwrap();
+    let mut update = transaction(2);
+    update.deltas = vec![Delta::modify(Fid(1), banner(0.0), banner(0.5)), Delta::remove(Fid(2), chair(100.0))];
+    update.evidence = Some(seen(b"photo", Some(b"png")));
+    scratch.map.commit(&update, at(3)).unwrap();
+    let mut classes: Vec<_> = ClassTable::default().iter().cloned().collect();
+    classes[8].name = "ground".to_owned();
+    let mut rename = transaction(3);
+    rename.classes = Some(ClassTable::new(classes).unwrap());
+    scratch.map.commit(&rename, at(4)).unwrap();
+    scratch.map.tag("surveyed", VersionId(1), at(5)).unwrap();
+    let mut proposal = transaction(4);
+    proposal.additions = vec![chair(3.0)];
+    scratch.map.propose(&proposal, at(6)).unwrap();
+    scratch
+}
+
+fn seen(capture: &[u8], labels: Option<&[u8]>) -> Observation {
+    Observation {
+        capture: Digest::of(capture),
+        taken_at: Some(at(2)),
+        labels: labels.map(<[u8]>::to_vec),
+        prior: None,
+        localization: None,
+        plugins: Vec::new(),
+        gates: Vec::new(),
+        rejections: Vec::new(),
+        decision: Decision::Committed,
+    }
+}
+
+/// Runs `sql` without triggers, references and constraints, and returns what `fsck` then finds.
+fn after_damage(sql: &str) -> Vec<String> {
+    let scratch = eventful();
+    let raw = Connection::open(scratch.map.path()).unwrap();
+    raw.execute_batch("PRAGMA foreign_keys = OFF; PRAGMA ignore_check_constraints = ON").unwrap();
+    let triggers: Vec<(String, String)> = raw
+        .prepare("SELECT name, sql FROM sqlite_schema WHERE type = 'trigger' ORDER BY name")
+        .unwrap()
+        .query_map([], |row| Ok((row.get(0)?, row.get(1)?)))
+        .unwrap()
+        .collect::<Result<_, _>>()
+        .unwrap();
+    triggers.iter().for_each(|(name, _)| raw.execute_batch(&format!("DROP TRIGGER {name}")).unwrap());
+    raw.execute_batch(sql).unwrap();
+    triggers.iter().for_each(|(_, definition)| raw.execute_batch(definition).unwrap());
+    scratch.map.fsck().unwrap().iter().map(ToString::to_string).collect()
+}
+
+fn assert_found(sql: &str, expected: &str) {
+    let problems = after_damage(sql);
+    let is_found = problems.iter().any(|problem| problem.starts_with(expected));
+    assert!(is_found, "{sql}\nexpected {expected}\nfound {problems:#?}");
+}
+
+#[test]
+fn a_sound_map_has_no_problems() {
+    assert_eq!(eventful().map.fsck(), Ok(Vec::new()));
+    assert_eq!(after_damage("SELECT 1"), Vec::<String>::new());
+}
+
+#[test]
+fn a_changed_state_breaks_the_hash_of_its_version_alone() {
+    // The object "tower" becomes "Tower".
+    let sql = "UPDATE feature_version SET state = CAST(substr(state, 1, 9) || x'54' || substr(state, 11) AS BLOB)
+        WHERE fid = 3";
+    let problems = after_damage(sql);
+    let chain: Vec<_> = problems.iter().filter(|problem| problem.contains("has hash")).collect();
+    assert!(chain.len() == 1 && chain[0].starts_with("versions: version 2: has hash"), "{problems:#?}");
+}
+
+/// What is done to the file, and how the problem that names it starts.
+const DAMAGE: &[(&str, &str)] = &[
+    // The index.
+    ("DELETE FROM feature_index WHERE id = 2", "index: feature 1 from version 1: is not in the index"),
+    ("UPDATE feature_index SET e0 = e0 - 1 WHERE id = 1", "index: feature 2 from version 1: the index has"),
+    ("UPDATE feature_index SET v1 = 2147483647 WHERE id = 2", "index: feature 1 from version 1: the index has"),
+    ("INSERT INTO feature_index VALUES (99, 0, 1, 0, 1, 0, 1, 0, 1)", "index: index row 99: belongs to no feature"),
+    // Life spans.
+    (
+        "UPDATE feature_version SET to_version = 4 WHERE fid = 1 AND to_version = 3",
+        "life-spans: feature 1 from version 3: overlaps",
+    ),
+    ("UPDATE feature_version SET to_version = 2 WHERE fid = 1 AND to_version = 3", "versions: version 2: says Counts"),
+    (
+        "UPDATE feature_version SET to_version = 1 WHERE fid = 2",
+        "sqlite: file: CHECK constraint failed in feature_version",
+    ),
+    ("DELETE FROM feature_version WHERE fid = 4", "versions: version 2: says Counts"),
+    // States.
+    (
+        "UPDATE feature_version SET state = x'0903' WHERE fid = 2",
+        "states: feature 2 from version 1: the state cannot be read",
+    ),
+    ("UPDATE feature_version SET class = 4 WHERE fid = 2", "states: feature 2 from version 1: kind, class or geometry"),
+    (
+        "UPDATE feature_version SET state = CAST(x'02FE' || substr(state, 3) AS BLOB), class = 254 WHERE fid = 2",
+        "states: feature 2 from version 1: class 254",
+    ),
+    // Geometry.
+    ("UPDATE geometry SET bytes = x'00'", "geometry: geometry ea6d019c"),
+    ("INSERT INTO geometry VALUES (zeroblob(32), x'00')", "geometry: geometry 0000"),
+    ("DELETE FROM geometry", "references: feature_version 3: refers to a row of geometry"),
+    // Versions.
+    ("DELETE FROM version WHERE version = 2", "versions: version 2: is missing"),
+    (
+        "UPDATE version SET committed_at = committed_at - 600000000 WHERE version = 3",
+        "versions: version 3: was made at",
+    ),
+    ("UPDATE version SET added = 7 WHERE version = 1", "versions: version 1: says Counts { added: 7"),
+    ("UPDATE version SET e1 = e1 + 1 WHERE version = 1", "versions: version 1: has envelope"),
+    ("UPDATE version SET hash = zeroblob(32) WHERE version = 1", "versions: version 2: has hash"),
+    ("UPDATE meta SET crs = 'EPSG:2056'", "versions: version 0: has hash"),
+    ("UPDATE version SET kind = 'import' WHERE version = 0", "versions: version 0: version 0, and no other"),
+    // Classes.
+    ("DELETE FROM class WHERE from_version = 4 AND class = 3", "classes: version 4: class \"banner\" is lost"),
+    ("UPDATE class SET name = 'Stone' WHERE class = 0", "classes: version 0: class table at version 0"),
+    ("DELETE FROM class WHERE from_version = 4", "versions: version 4: has hash"),
+    // Evidence.
+    ("UPDATE observation SET body = replace(body, '2026', '2025')", "observations: observation 1: has digest"),
+    ("DELETE FROM observation", "observations: version 3: its observation is missing"),
+    ("UPDATE observation SET capture = zeroblob(32)", "observations: observation 1: capture, labels or decision"),
+    ("UPDATE observation SET labels = zeroblob(32)", "observations: observation 1: capture, labels or decision"),
+    ("UPDATE label_image SET bytes = x'01'", "observations: label image"),
+    ("UPDATE proposal SET operations = x'01'", "proposals: proposal 1: operations: at byte 0"),
+    // Names and the file itself.
+    ("UPDATE tag SET name = 'head'", "tags: tag \"head\""),
+    ("UPDATE tag SET version = 77", "references: tag: refers to a row of version"),
+    ("DELETE FROM meta", "meta: meta: expected one row, found 0"),
+    ("UPDATE meta SET format = 'x'", "meta: meta: expected format"),
+    ("DROP INDEX feature_version_live", "schema: index feature_version_live: is missing"),
+    ("CREATE TABLE extra (x)", "schema: table extra: does not belong"),
+];
+
+#[test]
+fn every_seeded_kind_of_damage_is_found_and_named() {
+    for (sql, expected) in DAMAGE {
+        assert_found(sql, expected);
+    }
+}
+
+#[test]
+fn a_missing_trigger_is_found() {
+    let scratch = eventful();
+    let raw = Connection::open(scratch.map.path()).unwrap();
+    raw.execute_batch("DROP TRIGGER version_is_final").unwrap();
+    let problems = scratch.map.fsck().unwrap();
+    assert_eq!(problems[0].to_string(), "schema: trigger version_is_final: is missing");
+}
+
+#[test]
+fn history_cannot_be_rewritten_through_plain_sql() {
+    let scratch = eventful();
+    let raw = Connection::open(scratch.map.path()).unwrap();
+    for sql in [
+        "UPDATE version SET message = 'x'",
+        "DELETE FROM version",
+        "UPDATE feature_version SET state = x'00'",
+        "UPDATE feature_version SET to_version = NULL WHERE fid = 2",
+        "DELETE FROM feature_version",
+        "UPDATE geometry SET bytes = x'00'",
+        "DELETE FROM class",
+    ] {
+        assert!(raw.execute_batch(sql).is_err(), "{sql}");
+    }
+}
+
+#[test]
+fn a_bit_flipped_anywhere_in_the_file_never_panics() {
+    let scratch = eventful();
+    let path = scratch.map.path().to_owned();
+    let copy = scratch.directory.path().join("flipped.rsv");
+    drop(scratch.map);
+    let bytes = std::fs::read(path).unwrap();
+    let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+    let mut found = 0;
+    for position in (0..bytes.len()).step_by(331) {
+        let mut flipped = bytes.clone();
+        flipped[position] ^= 0x10;
+        std::fs::write(&copy, &flipped).unwrap();
+        let sound = MapFile::open_read_only(&copy).and_then(|map| {
+            map.snapshot(VersionId(2))?.features_in(&everywhere)?;
+            map.log_in(&everywhere)?;
+            map.changes(VersionId(0), VersionId(4))?;
+            map.fsck()
+        });
+        found += usize::from(sound != Ok(Vec::new()));
+    }
+    // Most bytes of so small a file are unused; what is used is noticed.
+    assert!(found > 20, "{found}");
+}
