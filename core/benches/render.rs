@@ -55,7 +55,7 @@ fn labels(scene: &Scene, camera: &Pinhole, pose: &Pose) -> (f64, f64, usize) {
     (whole, culled, visible.len())
 }
 
-/// Median of at least 30 runs, microseconds.
+/// Median of at least 30 runs, microseconds; `RESURVEY_BENCH_BEST` set: the best, for a busy machine.
 fn median<T>(mut run: impl FnMut() -> T) -> f64 {
     let mut times = Vec::new();
     let start = Instant::now();
@@ -65,7 +65,7 @@ fn median<T>(mut run: impl FnMut() -> T) -> f64 {
         times.push(before.elapsed().as_secs_f64() * 1e6);
     }
     times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
+    if std::env::var_os("RESURVEY_BENCH_BEST").is_some() { times[0] } else { times[times.len() / 2] }
 }
 
 const ORIGIN: GridPoint = GridPoint::new(836_000.0, 818_000.0, 4.5);

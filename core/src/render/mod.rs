@@ -1,6 +1,7 @@
 //! The map as seen from a pose: a scene of triangles in local coordinates, a rasteriser for images and rays for single
 //! queries.
 
+mod edges;
 mod frame;
 pub mod lidar;
 pub mod panorama;
@@ -11,6 +12,7 @@ mod rays;
 mod scene;
 mod setup;
 mod solid;
+mod texels;
 mod texture;
 mod view;
 

@@ -1,12 +1,17 @@
 //! From the scene's offsets to homogeneous pixels.
 
+use super::edges::first_centre;
 use super::scene::{Cluster, Scene};
 use crate::camera::{Pinhole, camera_from_world, world_from_camera};
 use nalgebra::{Matrix3, Vector3};
 use resurvey_schema::Pose;
+use std::ops::Range;
 
 /// Least depth drawn, metres.
 pub(super) const NEAR_M: f64 = 0.05;
+
+/// Slack of the box around a triangle, pixels; its edges decide.
+const SLACK_PX: f64 = 1e-3;
 
 /// A camera at a pose in a scene.
 #[derive(Clone, Debug)]
@@ -43,6 +48,18 @@ impl Projection {
     /// (u·z, v·z, z) of a corner.
     pub(super) fn project(&self, corner: [f32; 3]) -> Vector3<f64> {
         self.pixels_from_scene * (Vector3::from(corner.map(f64::from)) - self.centre)
+    }
+
+    /// Rows that the triangle may cover; empty when it covers no pixel centre.
+    pub(super) fn rows(&self, corners: &[Vector3<f64>; 3]) -> Range<usize> {
+        if corners.iter().any(|corner| corner.z < NEAR_M) {
+            return 0..self.height as usize;
+        }
+        let [a, b, c] = corners.map(|corner| corner.xy() / corner.z);
+        let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+        let between =
+            |low: f64, high: f64, size: f64| first_centre(low - SLACK_PX, size)..first_centre(high + SLACK_PX, size);
+        if between(low.x, high.x, self.width).is_empty() { 0..0 } else { between(low.y, high.y, self.height) }
     }
 
     /// Whether some point of the triangle may be inside the image: not all corners lie beyond the same side.

@@ -6,9 +6,11 @@
 use super::frame::{Frame, Span};
 use super::projection::Projection;
 use super::scene::Scene;
-use super::setup::{Setup, Shade, setup};
+use super::setup::{HomogeneousTriangle, Setup};
+use super::texels::Texels;
 use crate::camera::Pinhole;
 use crate::image::LabelImage;
+use crate::mesh::Surface;
 use resurvey_schema::Pose;
 
 /// Buffers and code to draw one image after the other without allocating anew; one per thread.
@@ -16,6 +18,8 @@ use resurvey_schema::Pose;
 pub struct Renderer {
     frame: Frame,
     setups: Vec<Setup>,
+    /// Of the setups with a texture that show.
+    texels: Vec<Option<Texels>>,
 }
 
 impl Renderer {
@@ -28,8 +32,9 @@ impl Renderer {
     ///
     /// Surfaces nearer than 0.05 m along the optical axis are not drawn.
     pub fn render_labels(&mut self, scene: &Scene, camera: &Pinhole, pose: &Pose, labels: &mut LabelImage) {
-        self.draw(scene, camera, pose);
-        self.shade(scene, labels);
+        let projection = Projection::new(scene, camera, pose);
+        self.draw(scene, camera, &projection);
+        self.shade(scene, &projection, labels);
     }
 
     /// The same, of the triangles with the given indices alone; indices outside the scene are left out.
@@ -45,7 +50,7 @@ impl Renderer {
         for &triangle in triangles.iter().filter(|&&triangle| (triangle as usize) < scene.positions().len()) {
             self.draw_triangle(scene, &projection, triangle);
         }
-        self.shade(scene, labels);
+        self.shade(scene, &projection, labels);
     }
 
     /// Indices of the triangles that show in the image drawn last, rising.
@@ -61,19 +66,57 @@ impl Renderer {
     }
 
     /// First pass over the whole scene.
-    pub(super) fn draw(&mut self, scene: &Scene, camera: &Pinhole, pose: &Pose) {
-        let projection = Projection::new(scene, camera, pose);
+    pub(super) fn draw(&mut self, scene: &Scene, camera: &Pinhole, projection: &Projection) {
         self.start(camera);
         for cluster in scene.clusters().iter().filter(|cluster| projection.may_see(cluster)) {
             for triangle in cluster.triangles.clone() {
-                self.draw_triangle(scene, &projection, triangle as u32);
+                self.draw_triangle(scene, projection, triangle as u32);
             }
         }
     }
 
     /// Setup of the nearest triangle per pixel of row `v`.
     pub(super) fn row(&self, v: usize) -> impl Iterator<Item = Option<&Setup>> {
-        self.frame.ids(v).iter().map(|&id| (id as usize).checked_sub(1).and_then(|index| self.setups.get(index)))
+        self.frame.ids(v).iter().map(|&id| self.drawn(id))
+    }
+
+    /// Second pass.
+    pub(super) fn shade(&mut self, scene: &Scene, projection: &Projection, labels: &mut LabelImage) {
+        let (width, height) = (self.frame.width(), self.frame.height());
+        if (labels.width() as usize, labels.height() as usize) != (width, height) {
+            *labels = LabelImage::filled(width as u32, height as u32, scene.sky().0);
+        }
+        self.texels.clear();
+        self.texels.resize(self.setups.len(), None);
+        for (v, row) in labels.values_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            let mut u = 0;
+            for run in self.frame.ids(v).chunk_by(|a, b| a == b) {
+                let pixels = &mut row[u..u + run.len()];
+                match (run[0] as usize).checked_sub(1) {
+                    None => pixels.fill(scene.sky().0),
+                    Some(index) => {
+                        let setup = &self.setups[index];
+                        match scene.surface(setup.triangle as usize) {
+                            Surface::Class(class) => pixels.fill(class.0),
+                            Surface::Texture(texture) => {
+                                let texels = &mut self.texels[index];
+                                if texels.is_none() {
+                                    *texels = texels_of(scene, projection, setup);
+                                }
+                                if let Some(texels) = texels {
+                                    texels.fill(texture, [u, v], pixels);
+                                }
+                            }
+                        }
+                    }
+                }
+                u += run.len();
+            }
+        }
+    }
+
+    fn drawn(&self, id: u32) -> Option<&Setup> {
+        (id as usize).checked_sub(1).and_then(|index| self.setups.get(index))
     }
 
     fn start(&mut self, camera: &Pinhole) {
@@ -82,10 +125,20 @@ impl Renderer {
     }
 
     fn draw_triangle(&mut self, scene: &Scene, projection: &Projection, triangle: u32) {
-        let Some((setup, edges)) = setup(scene, projection, triangle) else { return };
-        self.setups.push(setup);
+        let corners = scene.positions()[triangle as usize].map(|corner| projection.project(corner));
+        if !projection.may_see_triangle(&corners) {
+            return;
+        }
+        let rows = projection.rows(&corners);
+        if rows.is_empty() {
+            return;
+        }
+        let Some(homogeneous) = HomogeneousTriangle::new(corners) else { return };
+        let inverse_depth = homogeneous.inverse_depth();
+        let edges = homogeneous.edges(projection, rows);
+        self.setups.push(Setup { triangle, inverse_depth });
         let id = self.setups.len() as u32;
-        let [step, per_row, constant] = setup.inverse_depth;
+        let [step, per_row, constant] = inverse_depth;
         for v in edges.rows() {
             let y = v as f64 + 0.5;
             let (first, end) = edges.columns(y);
@@ -95,27 +148,9 @@ impl Renderer {
             }
         }
     }
+}
 
-    fn shade(&self, scene: &Scene, labels: &mut LabelImage) {
-        let (width, height) = (self.frame.width(), self.frame.height());
-        if (labels.width() as usize, labels.height() as usize) != (width, height) {
-            *labels = LabelImage::filled(width as u32, height as u32, scene.sky().0);
-        }
-        let rows = labels.values_mut().chunks_exact_mut(width.max(1));
-        for (v, row) in rows.enumerate() {
-            let ids = self.frame.ids(v);
-            let mut first = 0;
-            for run in ids.chunk_by(|a, b| a == b) {
-                let pixels = &mut row[first..first + run.len()];
-                match (run[0] as usize).checked_sub(1).and_then(|index| self.setups.get(index)) {
-                    None => pixels.fill(scene.sky().0),
-                    Some(setup) => match &setup.shade {
-                        Shade::Class(class) => pixels.fill(class.0),
-                        Shade::Texture(texture) => texture.classes(scene, setup, [first as f64, v as f64], pixels),
-                    },
-                }
-                first += run.len();
-            }
-        }
-    }
+fn texels_of(scene: &Scene, projection: &Projection, setup: &Setup) -> Option<Texels> {
+    let corners = scene.positions()[setup.triangle as usize].map(|corner| projection.project(corner));
+    Texels::new(scene, setup, &HomogeneousTriangle::new(corners)?)
 }

@@ -1,7 +1,6 @@
 //! The triangles of the map around a local origin: what the rasteriser and the rays see.
 
 use super::plate;
-use super::texture::UvRange;
 use crate::mesh::{Mesh, Object, Surface};
 use nalgebra::Vector3;
 use resurvey_schema::service::ViewFeature;
@@ -10,6 +9,10 @@ use std::ops::Range;
 
 /// Triangles in a cluster: small enough to be rejected whole, large enough that its box is cheap.
 const CLUSTER_TRIANGLES: usize = 32;
+
+/// Texture coordinates stay this share of a triangle's range inside it: rounding at the rim does not wrap round to the
+/// other side of the texture.
+const UV_INSET: f64 = 1e-6;
 
 /// The base map with descriptors on it, as f32 offsets from a local origin.
 #[derive(Clone, Debug)]
@@ -118,8 +121,15 @@ impl Scene {
         let point = Vector3::from(offset);
         let weight = |from: &Vector3<f64>, to: &Vector3<f64>| (to - from).cross(&(point - from)).dot(&normal) / area;
         let weights = [weight(&b, &c), weight(&c, &a), weight(&a, &b)];
-        let uv = std::array::from_fn(|axis| (0..3).map(|k| weights[k] * f64::from(uvs[k][axis])).sum::<f64>() as f32);
-        UvRange::of(uvs).hold(uv)
+        std::array::from_fn(|axis| {
+            let at_corners = [0, 1, 2].map(|corner| f64::from(uvs[corner][axis]));
+            let [low, high] =
+                [at_corners.iter().copied().reduce(f64::min), at_corners.iter().copied().reduce(f64::max)];
+            let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+            let inset = (high - low) * UV_INSET;
+            let interpolated: f64 = (0..3).map(|corner| weights[corner] * at_corners[corner]).sum();
+            interpolated.max(low + inset).min(high - inset) as f32
+        })
     }
 
     /// 0 for a triangle of the base map, otherwise 1 + index into the feature table; panics outside.

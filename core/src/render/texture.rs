@@ -13,31 +13,6 @@ pub fn texel_class(texture: &LabelTexture, u: f32, v: f32) -> ClassId {
     }
 }
 
-/// Texture coordinates stay this share of their range inside it.
-const INSET: f32 = 1e-6;
-
-/// The texture coordinates of a triangle, as a box: what is interpolated is held inside it, so that rounding at the rim
-/// does not wrap round to the other side of the texture.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct UvRange {
-    low: [f32; 2],
-    high: [f32; 2],
-}
-
-impl UvRange {
-    pub(super) fn of(uvs: &[[f32; 2]; 3]) -> Self {
-        let low: [f32; 2] = std::array::from_fn(|axis| uvs.iter().fold(f32::INFINITY, |low, uv| low.min(uv[axis])));
-        let high: [f32; 2] =
-            std::array::from_fn(|axis| uvs.iter().fold(f32::NEG_INFINITY, |high, uv| high.max(uv[axis])));
-        let inset: [f32; 2] = std::array::from_fn(|axis| (high[axis] - low[axis]) * INSET);
-        Self { low: [low[0] + inset[0], low[1] + inset[1]], high: [high[0] - inset[0], high[1] - inset[1]] }
-    }
-
-    pub(super) fn hold(&self, uv: [f32; 2]) -> [f32; 2] {
-        std::array::from_fn(|axis| uv[axis].max(self.low[axis]).min(self.high[axis]))
-    }
-}
-
 /// Texel of `coordinate` in a row of `size`.
 fn texel(wrap: Wrap, coordinate: f32, size: u32) -> Option<u32> {
     if !coordinate.is_finite() || size == 0 {

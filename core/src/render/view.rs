@@ -5,7 +5,6 @@ use super::projection::Projection;
 use super::raster::Renderer;
 use super::rays::RayCaster;
 use super::scene::Scene;
-use super::setup::Setup;
 use crate::camera::{Camera, Pinhole, world_from_camera};
 use crate::image::{LabelImage, Raster};
 use nalgebra::Vector3;
@@ -76,31 +75,30 @@ impl View {
 }
 
 fn rasterised(scene: &Scene, camera: &Pinhole, pose: &Pose) -> View {
-    let mut renderer = Renderer::new();
-    renderer.draw(scene, camera, pose);
     let projection = Projection::new(scene, camera, pose);
+    let mut renderer = Renderer::new();
     let mut view = View::empty(scene, camera.width(), camera.height());
+    renderer.draw(scene, camera, &projection);
+    renderer.shade(scene, &projection, &mut view.labels);
+    let labels = view.labels.clone();
     view.fill(|v| {
-        let y = v as f64 + 0.5;
-        let (projection, renderer) = (&projection, &renderer);
-        renderer
-            .row(v)
-            .enumerate()
-            .map(move |(u, setup)| setup.map(|setup| pixel(scene, projection, setup, [u as f64 + 0.5, y])))
+        let (projection, labels) = (&projection, labels.row(v as u32));
+        renderer.row(v).enumerate().map(move |(u, setup)| {
+            let setup = setup?;
+            let (x, y) = (u as f64 + 0.5, v as f64 + 0.5);
+            // The exact intersection of the ray with the triangle's plane.
+            let direction = projection.scene_from_pixels * Vector3::new(x, y, 1.0);
+            let depth_m = 1.0 / setup.inverse_depth_at(x, y);
+            let point = projection.centre + direction * depth_m;
+            Some(Pixel {
+                class: labels[u],
+                range_m: (direction.norm() * depth_m) as f32,
+                point: [point.x as f32, point.y as f32, point.z as f32],
+                feature: scene.feature(setup.triangle as usize),
+            })
+        })
     });
     view
-}
-
-fn pixel(scene: &Scene, projection: &Projection, setup: &Setup, [u, v]: [f64; 2]) -> Pixel {
-    let direction = projection.scene_from_pixels * Vector3::new(u, v, 1.0);
-    let depth = 1.0 / setup.inverse_depth_at(u, v);
-    let point = projection.centre + direction * depth;
-    Pixel {
-        class: setup.class_at(scene, u, v).0,
-        range_m: (direction.norm() * depth) as f32,
-        point: [point.x as f32, point.y as f32, point.z as f32],
-        feature: scene.feature(setup.triangle as usize),
-    }
 }
 
 /// Range from which a ray looks, metres; the counterpart of the rasteriser's least depth.
