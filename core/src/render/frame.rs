@@ -47,12 +47,12 @@ impl Frame {
         let row = span.v * self.width;
         let depths = &mut self.inverse_depths[row + span.first..row + span.end];
         let ids = &mut self.ids[row + span.first..row + span.end];
-        // Selects instead of a branch: the compiler turns this into vector code.
         for (index, (nearest, winner)) in depths.iter_mut().zip(ids).enumerate() {
             let inverse_depth = span.start + span.step * (index as i32) as f32;
-            let nearer = inverse_depth > *nearest;
-            *nearest = if nearer { inverse_depth } else { *nearest };
-            *winner = if nearer { id } else { *winner };
+            // Masks instead of a choice: a choice becomes a branch per pixel, this becomes vector code.
+            let nearer = u32::from(inverse_depth > *nearest).wrapping_neg();
+            *nearest = f32::from_bits((inverse_depth.to_bits() & nearer) | (nearest.to_bits() & !nearer));
+            *winner = (id & nearer) | (*winner & !nearer);
         }
     }
 }

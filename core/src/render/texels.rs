@@ -7,7 +7,7 @@ use crate::mesh::{LabelTexture, Surface, Wrap};
 use resurvey_schema::ClassId;
 
 /// Pixels worked on at once, so that the compiler uses vector code for all but the look-up.
-const LANES: usize = 16;
+const LANES: usize = 8;
 /// Texture coordinates stay this share of their range, or of the texture, inside it: rounding at a rim does not wrap
 /// round to the other side.
 const INSET: f64 = 1e-6;
@@ -63,7 +63,7 @@ impl Texels {
         match self.rule {
             Rule::Direct => self.look_up(texture, lines, pixels, |position, _| position),
             Rule::Repeat => self.look_up(texture, lines, pixels, |position, size| {
-                (position - ((position / size) as i32) as f32 * size).min(size - 1.0).max(0.0)
+                held(position - floor(position / size).0 * size, 0.0, size - 1.0)
             }),
             Rule::Any => {
                 for (index, pixel) in pixels.iter_mut().enumerate() {
@@ -82,13 +82,15 @@ impl Texels {
         wrapped: impl Fn(f32, f32) -> f32,
     ) {
         let labels = texture.labels.values();
-        let width = texture.labels.width() as i32;
+        let width = texture.labels.width();
         for (index, chunk) in pixels.chunks_mut(LANES).enumerate() {
             let first = (index * LANES) as f32;
-            let mut texels = [0_i32; LANES];
+            let mut texels = [0_u32; LANES];
             for (lane, texel) in texels.iter_mut().enumerate() {
                 let [column, row] = self.position(lines, first + (lane as i32) as f32);
-                *texel = wrapped(row, self.size[1]) as i32 * width + wrapped(column, self.size[0]) as i32;
+                let (_, column) = floor(wrapped(column, self.size[0]));
+                let (_, row) = floor(wrapped(row, self.size[1]));
+                *texel = row.wrapping_mul(width).wrapping_add(column);
             }
             for (pixel, texel) in chunk.iter_mut().zip(texels) {
                 *pixel = labels.get(texel as usize).copied().unwrap_or(ClassId::VOID.0);
@@ -101,8 +103,7 @@ impl Texels {
     fn position(&self, lines: [(f32, f32); 3], along: f32) -> [f32; 2] {
         let [column, row, inverse_depth] = lines.map(|(start, step)| start + step * along);
         let depth = 1.0 / inverse_depth;
-        let held = |value: f32, axis: usize| value.max(self.low[axis]).min(self.high[axis]);
-        [held(column * depth, 0), held(row * depth, 1)]
+        [held(column * depth, self.low[0], self.high[0]), held(row * depth, self.low[1], self.high[1])]
     }
 
     fn set_axis(&mut self, axis: usize, wrap: Wrap, form: [f64; 3], coordinates: [f32; 3]) {
@@ -133,4 +134,25 @@ impl Texels {
         self.high[axis] = ((high - shift).clamp(first, last) * size) as f32;
         self.forms[axis] = std::array::from_fn(|k| (form[k] - shift * self.inverse_depth[k]) * size);
     }
+}
+
+// `f32::max`, `f32::floor` and `as` take detours, for NaN, for a call and for what does not fit, that keep the compiler
+// from vector code.
+
+/// `value`, or the limit that it passes; `low` for NaN.
+#[inline(always)]
+fn held(value: f32, low: f32, high: f32) -> f32 {
+    let value = if value > low { value } else { low };
+    if value < high { value } else { high }
+}
+
+/// The whole part of a value from 0 to 2²², as float and as integer; some number for any other value.
+#[inline(always)]
+fn floor(value: f32) -> (f32, u32) {
+    /// Its neighbours are 1 apart, so that adding it rounds to a whole number, which is then in its low bits.
+    const WHOLE: f32 = 8_388_608.0;
+    let shifted = value + WHOLE;
+    let nearest = shifted - WHOLE;
+    let above = nearest > value;
+    (nearest - f32::from(u8::from(above)), (shifted.to_bits() & 0x7F_FFFF).wrapping_sub(u32::from(above)))
 }
