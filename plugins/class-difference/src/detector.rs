@@ -4,9 +4,9 @@ use crate::pairs::pair_regions;
 use crate::raster::Rasters;
 use crate::realign::explained;
 use crate::region::{Growth, grow, most_frequent, region, sound_components};
-use crate::removal::{Evidence, removed};
+use crate::removal::{Evidence, Seen, seen};
 use crate::settings::{Profile, SCHEMA, Settings};
-use crate::tolerance::tolerance_px;
+use crate::tolerance::Tolerance;
 use resurvey_plugin::schema::{ChangeRegion, ClassId, ClassKind, ClassTable};
 use resurvey_plugin::{Comparison, Detector, Error, Host, Plugin};
 
@@ -46,13 +46,19 @@ impl ClassDifference {
     ) -> Result<Vec<ChangeRegion>, Error> {
         let settings = &self.settings;
         let classes = host.classes();
-        let tolerance_px = tolerance_px(comparison, rasters, settings);
+        let tolerance = Tolerance::new(comparison, settings);
+        let tolerance_px = tolerance.per_pixel(rasters);
         let shows_behind = shows_behind(host, comparison, rasters, &tolerance_px)?;
+        let evidence = Evidence { rasters, tolerance: &tolerance, shows_behind: &shows_behind, settings };
+        let descriptors = seen(&evidence);
         let different = different(rasters, classes);
-        let in_view = explained(&rasters.photo, &rasters.view, &tolerance_px, rasters.width, &different);
+        let mut expected = explained(&rasters.photo, &rasters.view, &tolerance_px, rasters.width, &different);
+        for descriptor in descriptors.iter().filter(|descriptor| descriptor.is_still_there(settings)) {
+            descriptor.account(rasters, settings.label_jitter_px as i64, &mut expected);
+        }
         // What was behind a descriptor that is gone is no new material.
         let changed: Vec<bool> =
-            (0..different.len()).map(|at| different[at] && !in_view[at] && !shows_behind[at]).collect();
+            (0..different.len()).map(|at| different[at] && !expected[at] && !shows_behind[at]).collect();
         let same_descriptor = same_descriptor(rasters, classes);
         let growth = Growth { changed: &changed, different: &different, same_descriptor: &same_descriptor };
         let grown = grow(rasters, &tolerance_px, &growth);
@@ -61,11 +67,10 @@ impl ClassDifference {
         let added = added
             .iter()
             .map(|pixels| region(rasters, pixels, ClassId(rasters.photo[pixels[0]]), settings.max_hole_share));
-        let evidence = Evidence { rasters, tolerance_px: &tolerance_px, shows_behind: &shows_behind };
-        let gone = removed(&evidence, settings, limit_px);
-        let gone = gone.iter().map(|pixels| {
-            let shown = pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
-            region(rasters, pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
+        let is_large = |seen: &&Seen| seen.pixels.len() >= limit_px(rasters.view[seen.pixels[0]]);
+        let gone = descriptors.iter().filter(is_large).filter(|seen| seen.is_gone(&evidence)).map(|seen| {
+            let shown = seen.pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
+            region(rasters, &seen.pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
         });
         Ok(gone.chain(added).collect())
     }

@@ -7,25 +7,43 @@ use crate::raster::Rasters;
 use crate::settings::Settings;
 use resurvey_plugin::{Comparison, PoseEstimate};
 
-/// Tolerance per pixel, pixels. Where something near with a large tolerance may have moved over something far, the far
-/// pixels have the near one's.
-pub fn tolerance_px(comparison: &Comparison<'_>, rasters: &Rasters, settings: &Settings) -> Vec<u8> {
-    let focal_px = comparison.camera.fx.max(comparison.camera.fy);
-    let (position_m, angle_rad) = sigmas(&comparison.estimate);
-    let sigmas = settings.tolerance_sigmas;
-    let metres_squared = (sigmas * position_m).powi(2) + settings.map_tolerance_m.powi(2);
-    let angles_squared = (sigmas * angle_rad).powi(2);
-    let limit_px = f64::from(settings.max_tolerance_px);
-    let own: Vec<u8> = rasters
-        .range_m
-        .iter()
-        .map(|range_m| {
-            let range_m = f64::from(*range_m).max(1e-3);
-            let shift_px = focal_px * (metres_squared / (range_m * range_m) + angles_squared).sqrt();
-            (settings.label_jitter_px + shift_px).min(limit_px).ceil() as u8
-        })
-        .collect();
-    spread(&own, rasters.width, settings.max_tolerance_px)
+/// Tolerance as a function of range.
+pub struct Tolerance {
+    focal_px: f64,
+    metres_squared: f64,
+    angles_squared: f64,
+    jitter_px: f64,
+    limit_px: u8,
+}
+
+impl Tolerance {
+    /// The tolerance for the pose and the camera of `comparison`.
+    pub fn new(comparison: &Comparison<'_>, settings: &Settings) -> Self {
+        let (position_m, angle_rad) = sigmas(&comparison.estimate);
+        let sigmas = settings.tolerance_sigmas;
+        Self {
+            focal_px: comparison.camera.fx.max(comparison.camera.fy),
+            metres_squared: (sigmas * position_m).powi(2) + settings.map_tolerance_m.powi(2),
+            angles_squared: (sigmas * angle_rad).powi(2),
+            jitter_px: settings.label_jitter_px,
+            limit_px: settings.max_tolerance_px,
+        }
+    }
+
+    /// Tolerance at `range_m`, pixels, without upper bound.
+    pub fn at_px(&self, range_m: f64) -> f64 {
+        let range_m = range_m.max(1e-3);
+        self.jitter_px + self.focal_px * (self.metres_squared / (range_m * range_m) + self.angles_squared).sqrt()
+    }
+
+    /// Tolerance per pixel, pixels. Where something near with a large tolerance may have moved over something far, the
+    /// far pixels have the near one's.
+    pub fn per_pixel(&self, rasters: &Rasters) -> Vec<u8> {
+        let limit_px = f64::from(self.limit_px);
+        let own: Vec<u8> =
+            rasters.range_m.iter().map(|range_m| self.at_px(f64::from(*range_m)).min(limit_px).ceil() as u8).collect();
+        spread(&own, rasters.width, self.limit_px)
+    }
 }
 
 /// 1σ of the position, metres, in its worst direction, and of the attitude, radians.

@@ -35,9 +35,10 @@ struct Found {
 }
 
 impl Found {
-    /// Sum of the logarithms of how far off width and height are.
+    /// How far off the shape is, and half as much the size: a wrong range changes the size, not the shape.
     fn misfit(&self) -> f64 {
-        self.size_ratio.iter().map(|ratio| ratio.max(1e-3).ln().abs()).sum()
+        let [width, height] = self.size_ratio.map(|ratio| ratio.max(1e-3).ln());
+        (width - height).abs() + height.abs() / 2.0
     }
 }
 

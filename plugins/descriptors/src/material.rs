@@ -8,13 +8,17 @@ use crate::quad::{self, CORRELATION_PX, Quad};
 use crate::rectangle::{self, Corners};
 use crate::requirement::{Stop, Unmet, at_least, at_most};
 use crate::sight::Sight;
-use crate::spread::{Nudge, nudges};
+use crate::spread::{Nudge, nudges, pose_sigmas};
 use crate::window::{Window, rays};
 use nalgebra::{Vector2, Vector3};
 use resurvey_plugin::schema::{ChangeRegion, ClassKind, MaterialDescriptor, Uncertainty};
 
 /// Points to which a plane is fitted, at most.
 const PLANE_POINTS: usize = 1500;
+/// Standard deviations of the pose by which the plane's points keep away from the contour.
+const POSE_SIGMAS: f64 = 2.0;
+/// Smallest share of a region's size to which they keep.
+const MIN_INNER: f64 = 0.5;
 /// Pixels at which the fill is sampled, about.
 const FILL_SAMPLES: f64 = 5000.0;
 /// Share of the contour that may be hidden and still count as seen whole: label noise does that much.
@@ -85,14 +89,19 @@ fn contour(
     Ok((rays.iter().filter_map(|ray| window.pixel(ray)).collect(), hidden_share))
 }
 
-/// The plane of the surface behind the region.
+/// The plane of the surface behind the region, from points far enough inside that a pose error leaves them on it.
 fn wall(sight: &Sight<'_>, outline: &Outline) -> Result<Plane, Stop> {
     let pixels: Vec<[u32; 2]> = outline.pixels().collect();
-    let step = pixels.len().div_ceil(PLANE_POINTS).max(1);
-    let sampled = pixels.iter().step_by(step);
-    let points: Vec<Vector3<f64>> =
-        sampled.clone().filter_map(|[u, v]| sight.point(i64::from(*u), i64::from(*v))).collect();
-    let share = points.len() as f64 / sampled.count().max(1) as f64;
+    let sampled = pixels.iter().step_by(pixels.len().div_ceil(PLANE_POINTS).max(1));
+    let count = sampled.clone().count().max(1) as f64;
+    let centre = sampled.clone().map(|[u, v]| Vector2::new(f64::from(*u), f64::from(*v))).sum::<Vector2<f64>>() / count;
+    let inner = inner_share(sight, outline, &centre);
+    let point = |[u, v]: &[u32; 2]| {
+        let pixel = centre + (Vector2::new(f64::from(*u), f64::from(*v)) - centre) * inner;
+        sight.point(pixel.x.round() as i64, pixel.y.round() as i64)
+    };
+    let points: Vec<Vector3<f64>> = sampled.clone().filter_map(point).collect();
+    let share = points.len() as f64 / count;
     let settings = sight.settings;
     at_least("on-a-surface", share, settings.plane_point_share, "ratio")?;
     let reach = |axis: usize| {
@@ -109,6 +118,16 @@ fn wall(sight: &Sight<'_>, outline: &Outline) -> Result<Plane, Stop> {
     let measured_m = distances_m[((last as f64 * settings.plane_point_share).ceil() as usize).min(last)];
     at_most("coplanar", measured_m, limit_m, "m")?;
     Ok(plane)
+}
+
+/// Share of the region's size that is left when the pose error is taken off all around.
+fn inner_share(sight: &Sight<'_>, outline: &Outline, centre: &Vector2<f64>) -> f64 {
+    let range_m = sight.point(centre.x as i64, centre.y as i64).map_or(f64::INFINITY, |point| point.norm());
+    let (position_m, angle_rad) = pose_sigmas(&sight.comparison.estimate);
+    let focal_px = sight.comparison.camera.fx.max(sight.comparison.camera.fy);
+    let shift_px = focal_px * (position_m / range_m.max(0.1)).hypot(angle_rad);
+    let shorter_px = f64::from(outline.bounds.width().min(outline.bounds.height()));
+    (1.0 - 2.0 * POSE_SIGMAS * shift_px / shorter_px).clamp(MIN_INNER, 1.0)
 }
 
 impl Measurement<'_> {

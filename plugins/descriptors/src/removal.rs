@@ -3,6 +3,7 @@
 
 use crate::requirement::{Stop, Unmet, at_least};
 use crate::sight::Sight;
+use crate::spread::pose_sigmas;
 use crate::window::rays;
 use resurvey_plugin::schema::{ChangeRegion, ClassKind, Descriptor, GridPoint};
 
@@ -126,9 +127,7 @@ fn find(sight: &Sight<'_>, fid: u64, seen: GridPoint) -> Result<Option<Descripto
 
 /// 1σ of where something `range_m` away seems to be, metres.
 fn pose_sigma_m(sight: &Sight<'_>, range_m: f64) -> f64 {
-    let estimate = &sight.comparison.estimate;
-    let [[ee, ..], [_, nn, _], [_, _, yaw]] = estimate.covariance;
-    let variance =
-        ee + nn + estimate.height_sigma_m.powi(2) + range_m.powi(2) * (yaw + estimate.tilt_sigma_rad.powi(2));
-    if variance.is_finite() { variance.max(0.0).sqrt() } else { 0.0 }
+    let (position_m, angle_rad) = pose_sigmas(&sight.comparison.estimate);
+    let sigma_m = position_m.hypot(range_m * angle_rad);
+    if sigma_m.is_finite() { sigma_m } else { 0.0 }
 }

@@ -40,3 +40,10 @@ pub fn nudges(estimate: &PoseEstimate) -> Option<Vec<Nudge>> {
     }
     Some(nudges)
 }
+
+/// 1σ of the position, metres, in its worst direction, and of the attitude, radians.
+pub fn pose_sigmas(estimate: &PoseEstimate) -> (f64, f64) {
+    let [[ee, en, _], [_, nn, _], [_, _, yaw]] = estimate.covariance;
+    let plan = (ee + nn) / 2.0 + ((ee - nn) / 2.0).hypot(en);
+    (plan.max(0.0).sqrt().max(estimate.height_sigma_m), yaw.max(0.0).sqrt().max(estimate.tilt_sigma_rad))
+}
