@@ -139,11 +139,13 @@ fn token(bytes: &[u8], at: usize) -> (Kind, usize) {
         [b'"', ..] => (Kind::Text, string_end(bytes, at + 1)),
         [b'\'', b'\\', _, ..] => (Kind::Text, find(bytes, at + 3, b"'").map_or(bytes.len(), |end| end + 1)),
         [b'\'', ..] => {
-            let width = std::str::from_utf8(&rest[1..rest.len().min(5)])
-                .map_or_else(|error| std::str::from_utf8(&rest[1..1 + error.valid_up_to()]).unwrap_or(""), |text| text)
-                .chars()
-                .next()
-                .map_or(1, char::len_utf8);
+            // A character is as many bytes as its first one says; a lifetime has no quote after it.
+            let width = match rest.get(1) {
+                Some(0xf0..) => 4,
+                Some(0xe0..) => 3,
+                Some(0xc0..) => 2,
+                _ => 1,
+            };
             if rest.get(1 + width) == Some(&b'\'') { (Kind::Text, at + width + 2) } else { (Kind::Code, at + 1) }
         }
         [b'r', b'"' | b'#', ..] if starts_word => raw_string(bytes, at, at + 1),
