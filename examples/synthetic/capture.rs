@@ -1,12 +1,13 @@
 //! One capture with its truth: what the phone sends, what the map knew, what really was.
 
-use super::caster::picture;
+use super::caster::{Picture, picture};
 use super::change::{Change, ChangeKind, Event, Placed, event};
 use super::clutter::{add_clutter, real_world};
 use super::noise::{NoiseLevel, disturb};
 use super::prior::{PriorError, stated_yaw_sigma_deg};
 use super::random::Random;
 use super::scene::Scene;
+use super::world::World;
 use resurvey_schema::capture::FORMAT;
 use resurvey_schema::{CameraFile, CaptureFile, ClassId, ClassTable, PriorFile};
 use serde_json::{Map, Value, json};
@@ -83,8 +84,11 @@ impl Case {
             add_clutter(&mut cluttered, scene, &noise, event.camera.position, &mut random("clutter"));
         }
         let before = picture(&event.before, &event.camera);
-        let after = picture(&event.after, &event.camera);
-        let photo = picture(&cluttered, &event.camera);
+        let again = |world: &World, known: &World, seen: &Picture| {
+            if world == known { seen.clone() } else { picture(world, &event.camera) }
+        };
+        let after = again(&event.after, &event.before, &before);
+        let photo = again(&cluttered, &event.after, &after);
         let changed: Vec<usize> =
             (0..photo.hits.len()).filter(|&i| before.hits[i].class != after.hits[i].class).collect();
         let visible = changed.iter().filter(|&&i| photo.hits[i].thing == after.hits[i].thing).count();
