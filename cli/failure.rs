@@ -5,6 +5,7 @@ use resurvey_core::crs::CrsError;
 use resurvey_core::export::ExportError;
 use resurvey_core::image::ImageError;
 use resurvey_core::mesh::{ClassMapError, EncodingError, ImportError};
+use resurvey_core::localize::HeatMapError;
 use resurvey_core::plugin::{PluginError, SettingsError};
 use resurvey_core::store::{CommitError, StoreError};
 use resurvey_core::update::UpdateError;
@@ -87,6 +88,7 @@ failure_from! {
     CaptureError => INPUT,
     CrsError => USAGE,
     ExportError => INTERNAL,
+    HeatMapError => INTERNAL,
     ImageError => INPUT,
     ImportError => INPUT,
     ClassMapError => INPUT,

@@ -20,5 +20,7 @@ pub mod tolerance;
 pub use detector::ClassDifference;
 pub use settings::Settings;
 
+resurvey_plugin::export_detector!(ClassDifference);
+
 #[cfg(test)]
 mod tests;

@@ -25,3 +25,5 @@ pub mod window;
 
 pub use estimator::Descriptors;
 pub use settings::Settings;
+
+resurvey_plugin::export_estimator!(Descriptors);
