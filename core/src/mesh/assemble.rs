@@ -3,11 +3,9 @@
 use super::axes::Placement;
 use super::model::{Model, Part};
 use super::{ImportError, Mesh, Object, Surface};
+use crate::crs::{LOCAL_LIMIT_M, LocalOrigin};
 use resurvey_schema::GridPoint;
 use std::collections::BTreeMap;
-
-/// Largest offset from a mesh's origin, metres: an `f32` step is 0.24 mm there.
-pub const MAX_OFFSET_M: f64 = 2048.0;
 
 /// Largest coordinate before the origin is added, metres; ten times round the Earth's quarter.
 const MAX_COORDINATE_M: f64 = 1e8;
@@ -141,7 +139,7 @@ struct Checked {
 struct Offsets {
     /// From the model's origin to the near one, whole metres.
     shift: [f64; 3],
-    /// One per vertex; meaningless where no face uses it.
+    /// One per vertex; zero where no face uses it.
     offsets: Vec<[f32; 3]>,
 }
 
@@ -183,13 +181,18 @@ impl Checked {
         }
         // Whole metres leave the fraction of every coordinate as it is.
         let middle: [f64; 3] = std::array::from_fn(|axis| ((low[axis] + high[axis]) / 2.0).round());
-        let reach = (0..3).map(|axis| (high[axis] - middle[axis]).max(middle[axis] - low[axis])).fold(0.0, f64::max);
-        if reach > MAX_OFFSET_M {
-            let size_m = std::array::from_fn(|axis| high[axis] - low[axis]);
-            return Err(ImportError::ObjectTooLarge { object: self.name.clone(), size_m, limit_m: 2.0 * MAX_OFFSET_M });
-        }
-        let offset = |vertex: &[f64; 3]| std::array::from_fn(|axis| (vertex[axis] - middle[axis]) as f32);
-        Ok(Some(Offsets { shift: middle, offsets: self.vertices.iter().map(offset).collect() }))
+        let too_large = || ImportError::ObjectTooLarge {
+            object: self.name.clone(),
+            size_m: std::array::from_fn(|axis| high[axis] - low[axis]),
+            limit_m: 2.0 * LOCAL_LIMIT_M,
+        };
+        let near = LocalOrigin::new(middle.into()).map_err(|_| too_large())?;
+        let offset = |(vertex, is_used): (&[f64; 3], &bool)| match is_used {
+            true => near.to_local((*vertex).into()).map_err(|_| too_large()),
+            false => Ok([0.0; 3]),
+        };
+        let offsets = self.vertices.iter().zip(&self.is_used).map(offset).collect::<Result<_, _>>()?;
+        Ok(Some(Offsets { shift: middle, offsets }))
     }
 
     /// Fills `mesh` with the kept faces and only the vertices that they use, in the order of the file.

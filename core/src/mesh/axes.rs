@@ -17,15 +17,15 @@ impl Up {
             Self::Z => [x, y, z],
         }
     }
-
-    /// The point of the file at east, north, up: the inverse of [`Up::grid_from_file`].
-    pub fn file_from_grid(self, [east, north, up]: [f64; 3]) -> [f64; 3] {
-        match self {
-            Self::Y => [east, up, -north],
-            Self::Z => [east, north, up],
-        }
-    }
 }
+
+/// Turns E, N, H into glTF's x = E, y = H, z = −N: column-major, for the root node of an export.
+pub const GLTF_FROM_GRID: [f32; 16] = [
+    1.0, 0.0, 0.0, 0.0, //
+    0.0, 0.0, -1.0, 0.0, //
+    0.0, 1.0, 0.0, 0.0, //
+    0.0, 0.0, 0.0, 1.0,
+];
 
 /// How a model lies in the map: its axes, then a turn about the up axis, then an origin that the caller adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,9 @@ mod tests {
     fn gltf_forward_is_south_and_its_up_is_height() {
         // glTF 2.0, 3.4: +Y up, +Z forward, −X right of it; seen from above with east right, +Z points south.
         assert_eq!(Up::Y.grid_from_file([1.0, 2.0, 3.0]), [1.0, -3.0, 2.0]);
-        assert_eq!(Up::Y.file_from_grid([1.0, -3.0, 2.0]), [1.0, 2.0, 3.0]);
+        let gltf_from_grid = nalgebra::Matrix4::from_column_slice(&GLTF_FROM_GRID).cast::<f64>();
+        let point = gltf_from_grid.transform_point(&nalgebra::Point3::new(1.0, -3.0, 2.0));
+        assert_eq!(<[f64; 3]>::from(point.coords), [1.0, 2.0, 3.0]);
     }
 
     #[test]

@@ -40,8 +40,7 @@ pub enum ClassMapError {
 }
 
 impl ClassMap {
-    /// The map in a TOML text of lines `"name" = "class"`; the key `default` is for every other name. The class `void`
-    /// is allowed: such faces are never compared.
+    /// The map in a TOML text of lines `"name" = "class"`; the key `default` is for every other name.
     pub fn parse(text: &str, classes: &ClassTable) -> Result<Self, ClassMapError> {
         let table: toml::Table = text
             .parse()
@@ -53,7 +52,6 @@ impl ClassMap {
             };
             let id = match classes.by_name(class.trim()) {
                 Some(class) => class.index,
-                None if class.trim().eq_ignore_ascii_case("void") => ClassId::VOID,
                 None => return Err(ClassMapError::UnknownClass { name, class, known: known_names(classes) }),
             };
             match name.as_str() {

@@ -70,7 +70,7 @@ impl Classifying<'_> {
             let labels = images.entry(image).or_insert_with(|| match self.labels(model, image) {
                 Ok(labels) => Some(labels),
                 Err(reason) => {
-                    problems.push(format!("{name} (material {material:?}): {reason}"));
+                    problems.push(format!("{name:?} (material {material:?}): {reason}"));
                     None
                 }
             });

@@ -9,7 +9,8 @@
 //! ```
 //! Little endian. Equal meshes have equal bytes: negative zero is stored as zero, and nothing else has two forms.
 
-use super::{LabelTexture, MAX_OFFSET_M, Mesh, Surface, Wrap};
+use super::{LabelTexture, Mesh, Surface, Wrap};
+use crate::crs::LOCAL_LIMIT_M;
 use crate::image::Raster;
 use resurvey_schema::{ClassId, GridPoint};
 
@@ -210,7 +211,7 @@ impl Body<'_> {
 
 /// What breaks a promise of [`Mesh`], if anything does.
 fn fault(mesh: &Mesh) -> Option<String> {
-    let is_far = |value: &f32| value.is_nan() || f64::from(value.abs()) > MAX_OFFSET_M;
+    let is_far = |value: &f32| value.is_nan() || f64::from(value.abs()) > LOCAL_LIMIT_M;
     let has_textures = mesh.surfaces.iter().any(|surface| matches!(surface, Surface::Texture(_)));
     let uvs = if has_textures { mesh.vertices.len() } else { 0 };
     let is_wild = |index: &u32| *index as usize >= mesh.vertices.len();
@@ -219,7 +220,7 @@ fn fault(mesh: &Mesh) -> Option<String> {
         return Some(format!("expected a finite origin, found {:?}", mesh.origin));
     }
     if let Some(value) = mesh.vertices.as_flattened().iter().find(|value| is_far(value)) {
-        return Some(format!("expected offsets of at most {MAX_OFFSET_M} m, found {value}"));
+        return Some(format!("expected offsets of at most {LOCAL_LIMIT_M} m, found {value}"));
     }
     if mesh.uvs.len() != uvs || !mesh.uvs.as_flattened().iter().all(|value| value.is_finite()) {
         return Some(format!("expected {uvs} finite texture coordinates, found {} or not finite", mesh.uvs.len()));

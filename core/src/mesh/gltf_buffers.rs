@@ -6,6 +6,9 @@ use super::gltf_schema::{Accessor, BufferView, Root};
 use super::model::check_count;
 use super::neighbours::Neighbours;
 
+/// Most bytes of all buffers together.
+const MAX_BUFFER_BYTES: usize = 1 << 32;
+
 /// The error that `reason` at the JSON path or file part `at` is.
 pub(super) fn damaged(at: impl Into<String>, reason: impl Into<String>) -> ImportError {
     ImportError::DamagedGltf { at: at.into(), reason: reason.into() }
@@ -113,6 +116,7 @@ impl<'a> Buffers<'a> {
     /// Loads every buffer of `root`: the binary chunk, data URIs, files beside the model.
     pub fn load(root: &'a Root, binary: Option<&[u8]>, neighbours: &Neighbours) -> Result<Self, ImportError> {
         let mut contents = Vec::new();
+        let mut total = 0;
         for (index, buffer) in root.buffers.iter().enumerate() {
             let at = || format!("buffers[{index}]");
             let content = match (&buffer.uri, binary) {
@@ -122,6 +126,11 @@ impl<'a> Buffers<'a> {
                 (None, Some(binary)) if index == 0 => binary.to_vec(),
                 (None, _) => return Err(damaged(at(), "expected a URI or a binary chunk, found neither")),
             };
+            // Many buffers may name the same file: a small one could ask for any amount of memory.
+            total += content.len();
+            if total > MAX_BUFFER_BYTES {
+                return Err(ImportError::TooMany { what: "bytes of buffers", limit: MAX_BUFFER_BYTES });
+            }
             if content.len() < buffer.byte_length {
                 let (expected, found) = (buffer.byte_length, content.len());
                 return Err(damaged(at(), format!("expected {expected} bytes, found {found}")));
@@ -156,7 +165,7 @@ impl<'a> Buffers<'a> {
         let accessor = self.accessor(index)?;
         let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
         if accessor.shape != shape {
-            return Err(damaged(at(), format!("expected {shape}, found {}", accessor.shape)));
+            return Err(damaged(at(), format!("expected {shape}, found {:?}", accessor.shape)));
         }
         check_count("vertices or indices", accessor.count)?;
         let number = Number::new(accessor.component_type, accessor.normalized)

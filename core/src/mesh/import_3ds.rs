@@ -134,7 +134,7 @@ impl Reading {
         }
         let image = match moved[..] {
             [] => Ok(self.image(file)),
-            _ => Err(format!("{file}: the texture map is scaled, shifted or turned; bake that into the coordinates")),
+            _ => Err(format!("{file:?}: the texture map is scaled, shifted or turned; bake that into the coordinates")),
         };
         let wrap = match tiling {
             bits if bits & TILING_MIRROR != 0 => Wrap::Mirror,

@@ -53,7 +53,7 @@ pub enum ImportError {
         reason: String,
     },
     /// glTF extensions without which the file cannot be decoded.
-    #[error("the glTF file requires {}, which cannot be decoded; export it without", names.join(", "))]
+    #[error("the glTF file requires {}, which cannot be decoded; export it without", list(names))]
     GltfExtensions {
         /// Names of the extensions.
         names: Vec<String>,

@@ -1,7 +1,7 @@
 //! glTF 2.0 files, `.gltf` and `.glb`: the triangles of the default scene with their materials and label textures.
 //!
 //! The file's axes are y up, z south. A file of our own export says in `asset.extras.resurvey.grid_origin` where its
-//! zero lies, as [E, N, H]. Appearance, animation, skins and cameras are left alone.
+//! zero lies, as [E, N, H]; the descriptors in it are not objects and are left out. Appearance, animation, skins and cameras are left alone.
 
 use super::gltf_buffers::{Buffers, damaged, data_uri, percent_decoded, split_container};
 use super::gltf_scene::{Placed, placed_meshes};
@@ -59,7 +59,14 @@ pub(super) fn read_gltf(bytes: &[u8], neighbours: &Neighbours) -> Result<Model, 
         face_count: 0,
         coarse: None,
     };
-    let parts = placed_meshes(&root)?.iter().map(|placed| reading.part(placed)).collect::<Result<_, _>>()?;
+    let mut placed = placed_meshes(&root)?;
+    let found = placed.len();
+    placed.retain(|placed| !is_descriptor(&root, placed.node));
+    if placed.len() < found {
+        let left_out = found - placed.len();
+        warnings.push(format!("{left_out} descriptors of the export are left out: an import adds objects only"));
+    }
+    let parts = placed.iter().map(|placed| reading.part(placed)).collect::<Result<_, _>>()?;
     warnings.extend(reading.coarse);
     Ok(Model {
         format: "glTF",
@@ -71,6 +78,13 @@ pub(super) fn read_gltf(bytes: &[u8], neighbours: &Neighbours) -> Result<Model, 
         skipped_primitives: reading.skipped_primitives,
         warnings,
     })
+}
+
+/// Whether `node` stands for a descriptor in a file of our own export.
+fn is_descriptor(root: &Root, node: usize) -> bool {
+    let is_own = root.asset.extras.as_ref().is_some_and(|extras| extras.get("resurvey").is_some());
+    let kind = root.nodes[node].extras.as_ref().and_then(|extras| extras.get("kind")?.as_str());
+    is_own && matches!(kind, Some("material" | "dynamic"))
 }
 
 fn grid_origin(root: &Root, warnings: &mut Vec<String>) -> Option<GridPoint> {

@@ -18,8 +18,7 @@ mod model;
 mod neighbours;
 mod surface;
 
-pub use assemble::MAX_OFFSET_M;
-pub use axes::Up;
+pub use axes::{GLTF_FROM_GRID, Up};
 pub use class_map::{ClassMap, ClassMapError, class_named};
 pub use encoding::{EncodingError, decode_mesh, encode_mesh};
 pub use import::{ImportOptions, ImportReport, Imported, import_model};

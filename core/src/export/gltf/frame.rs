@@ -1,14 +1,8 @@
-//! Where an export's numbers start and which way its axes point. The one place where axes are swapped for glTF.
+//! Where an export's numbers start and which way its axes point.
 
 use crate::crs::{CrsError, GridPoint, LocalOrigin};
 
-/// Turns E, N, H into glTF's x = E, y = H, z = −N: column-major, for the root node.
-pub(super) const GLTF_FROM_MAP: [f32; 16] = [
-    1.0, 0.0, 0.0, 0.0, //
-    0.0, 0.0, -1.0, 0.0, //
-    0.0, 1.0, 0.0, 0.0, //
-    0.0, 0.0, 0.0, 1.0,
-];
+pub(super) use crate::mesh::GLTF_FROM_GRID as GLTF_FROM_MAP;
 
 /// Smallest box around grid points; all of them finite.
 #[derive(Clone, Copy, Debug, Default)]

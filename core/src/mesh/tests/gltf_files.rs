@@ -212,7 +212,7 @@ fn extensions_that_cannot_be_decoded_are_refused_by_name() {
             json!(["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_materials_unlit"]);
     });
     let text = message(&bytes);
-    assert!(text.contains("requires KHR_draco_mesh_compression, EXT_meshopt_compression, which"), "{text}");
+    assert!(text.contains("requires \"KHR_draco_mesh_compression\", \"EXT_meshopt_compression\", which"), "{text}");
 }
 
 #[test]

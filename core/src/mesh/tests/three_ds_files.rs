@@ -181,7 +181,7 @@ fn the_tiling_of_a_texture_map_is_kept_and_a_moved_map_is_refused() {
     }
     assert!(import_with(&chunk(0xA354, &[&floats(&[1.0])])).is_ok());
     let error = import_with(&chunk(0xA35A, &[&floats(&[0.25])])).unwrap_err().to_string();
-    assert!(error.contains("labels.png: the texture map is scaled, shifted or turned"), "{error}");
+    assert!(error.contains("\"labels.png\": the texture map is scaled, shifted or turned"), "{error}");
 }
 
 #[test]
