@@ -36,9 +36,12 @@ fn again(objects: &[Object], descriptors: &[Descriptor]) -> Imported {
     import_model(&path, &ImportOptions::default(), &classes).unwrap()
 }
 
-/// Corners, surface and texture coordinates of each triangle, in an order of their own: an export groups faces by
+/// Surface, corners and texture coordinates of a triangle.
+type Face = (String, [[f64; 3]; 3], Vec<[f32; 2]>);
+
+/// The faces of `mesh`, in an order of their own: an export groups faces by
 /// surface.
-fn faces(mesh: &Mesh) -> Vec<(String, [[f64; 3]; 3], Vec<[f32; 2]>)> {
+fn faces(mesh: &Mesh) -> Vec<Face> {
     let surface = |surface: &Surface| match surface {
         Surface::Class(class) => format!("class {}", class.0),
         Surface::Texture(LabelTexture { name, labels, wrap_u, wrap_v }) => {
