@@ -2,6 +2,7 @@
 
 mod compare;
 mod gate;
+mod heatmap;
 mod locate;
 mod search;
 mod services;
@@ -9,6 +10,7 @@ mod sweep;
 mod world;
 
 pub use gate::{GATE_KEYS, GateLimits};
+pub use heatmap::{HeatMap, HeatMapError, heat_map};
 pub use locate::{Located, localize};
 pub use search::SearchLimits;
 pub use services::{Listener, SceneServices, Silent};
