@@ -118,13 +118,15 @@ impl MapFile {
 
 /// The version numbered `version`.
 fn record(connection: &Connection, version: VersionId) -> Result<VersionRecord, Fault> {
-    check_version(connection, version)?;
     let sql = format!("SELECT {} FROM version WHERE version = :version ORDER BY version", VersionRow::COLUMNS);
     let mut statement = connection.prepare_cached(&sql)?;
     let mut rows = statement.query(named_params! {":version": version.0 as i64})?;
     match rows.next()? {
         Some(row) => VersionRow::read(row),
-        None => Err(Fault::Damage(format!("version {version} is missing"))),
+        None => {
+            check_version(connection, version)?;
+            Err(Fault::Damage(format!("version {version} is missing")))
+        }
     }
 }
 
@@ -205,9 +207,10 @@ fn steps(connection: &Connection, fid: Fid) -> Result<Vec<(VersionId, Delta)>, F
 
 /// For every version, how many features it changed that lie in `region` before or after.
 fn counts_in(connection: &Connection, region: &BoxMm) -> Result<BTreeMap<VersionId, Counts>, Fault> {
+    // The state before, if there was one, is the last that began earlier.
     const BEGAN: &str = "SELECT f.fid, f.from_version,
-            EXISTS (SELECT 1 FROM feature_version AS p WHERE p.fid = f.fid AND p.to_version = f.from_version
-                AND p.to_version IS NOT NULL), 1";
+            coalesce(f.from_version = (SELECT p.to_version FROM feature_version AS p
+                WHERE p.fid = f.fid AND p.from_version < f.from_version ORDER BY p.from_version DESC LIMIT 1), 0), 1";
     const ENDED: &str = "SELECT f.fid, f.to_version, 1,
             EXISTS (SELECT 1 FROM feature_version AS n WHERE n.fid = f.fid AND n.from_version = f.to_version)";
     let mut changed = BTreeMap::new();

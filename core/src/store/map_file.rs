@@ -21,6 +21,7 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 const CACHE_KIB: i64 = 65_536;
 
 /// An open map. It is one connection: open the file again for another thread.
+#[derive(Debug)]
 pub struct MapFile {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
@@ -173,7 +174,11 @@ impl MapFile {
     }
 
     fn connect(path: &Path, flags: OpenFlags) -> Result<Self, Fault> {
-        Self::connect_to(path, path, flags)
+        // SQLite takes what starts like this for a URI.
+        match path.to_str().filter(|text| text.starts_with("file:")) {
+            Some(text) => Self::connect_to(path, format!("./{text}"), flags),
+            None => Self::connect_to(path, path, flags),
+        }
     }
 
     fn connect_to(path: &Path, target: impl AsRef<Path>, flags: OpenFlags) -> Result<Self, Fault> {

@@ -9,6 +9,7 @@ use resurvey_schema::ClassTable;
 use rusqlite::{Connection, OptionalExtension, ToSql, named_params};
 
 /// The map as it was at one version, whatever is committed meanwhile. It cannot write.
+#[derive(Debug)]
 pub struct Snapshot<'m> {
     map: &'m MapFile,
     version: VersionId,

@@ -34,7 +34,7 @@ impl FeatureState {
     }
 
     /// Appends the canonical bytes; they say themselves where they end.
-    pub fn push_bytes(&self, bytes: &mut Vec<u8>) {
+    pub(super) fn push_bytes(&self, bytes: &mut Vec<u8>) {
         match self {
             Self::Descriptor(Descriptor::Material(material)) => {
                 bytes.extend([MATERIAL, material.class.0, sigma_flags(material.sigma)]);
@@ -69,7 +69,7 @@ impl FeatureState {
 }
 
 /// The canonical bytes of a class table.
-pub fn class_table_bytes(classes: &ClassTable) -> Vec<u8> {
+pub(super) fn class_table_bytes(classes: &ClassTable) -> Vec<u8> {
     let mut bytes = (classes.iter().count() as u16).to_le_bytes().to_vec();
     for class in classes.iter() {
         let kind = match class.kind {

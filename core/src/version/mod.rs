@@ -15,7 +15,7 @@ mod revision;
 mod transaction;
 
 pub use box_mm::{BoxMm, InvalidBox};
-pub use canonical::{CanonicalError, class_table_bytes};
+pub use canonical::CanonicalError;
 pub use change_set::{ChangeSet, ChangeSetError, read_change_set, write_change_set};
 pub use delta::{Counts, Delta};
 pub use descriptor_file::{InvalidDescriptor, descriptor_from_file, descriptor_to_file};

@@ -192,3 +192,44 @@ fn a_snapshot_stays_as_it_is_while_others_commit() {
     assert_eq!(states, [banner(0.0), chair(100.0)]);
     assert_eq!(other.snapshot(VersionId(2)).unwrap().feature(Fid(1)).unwrap().state, banner(0.5));
 }
+
+#[test]
+fn of_eight_writers_at_once_none_is_lost() {
+    let scratch = Scratch::new();
+    let path = scratch.map.path();
+    let write = |writer: u64| {
+        let map = MapFile::open(path).unwrap();
+        map.set_busy_timeout(std::time::Duration::from_secs(60)).unwrap();
+        for place in 0..5 {
+            let mut update = transaction(map.head().unwrap().0);
+            update.additions = vec![chair((writer * 5 + place) as f64)];
+            map.commit(&update, at(1)).unwrap();
+        }
+    };
+    std::thread::scope(|scope| (0..8).for_each(|writer| drop(scope.spawn(move || write(writer)))));
+    assert_eq!(scratch.map.head(), Ok(VersionId(40)));
+    let features = scratch.map.snapshot(VersionId(40)).unwrap().features().unwrap();
+    let mut offsets: Vec<_> = features.into_iter().map(|feature| feature.state.bounds().unwrap().min()[1]).collect();
+    offsets.sort_unstable();
+    offsets.dedup();
+    assert_eq!(offsets.len(), 40);
+    assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+}
+
+#[test]
+fn two_that_change_the_same_feature_at_once_cannot_both_win() {
+    let scratch = Scratch::with_two_features();
+    let path = scratch.map.path();
+    let write = |offset: f64| {
+        let map = MapFile::open(path).unwrap();
+        let mut update = transaction(1);
+        update.deltas = vec![Delta::modify(Fid(2), chair(100.0), chair(offset))];
+        map.commit(&update, at(2))
+    };
+    let results = std::thread::scope(|scope| {
+        let writers: Vec<_> = (0..4).map(|writer| scope.spawn(move || write(f64::from(writer)))).collect();
+        writers.into_iter().map(|writer| writer.join().unwrap()).collect::<Vec<_>>()
+    });
+    assert_eq!(results.iter().filter(|result| **result == Ok(VersionId(2))).count(), 1);
+    assert_eq!(results.iter().filter(|result| matches!(result, Err(CommitError::Conflict { .. }))).count(), 3);
+}

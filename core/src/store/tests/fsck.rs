@@ -6,7 +6,7 @@ use rusqlite::Connection;
 
 /// Two objects that share geometry, a banner that moved, a chair that left, evidence with a label image, a tag, a
 /// proposal, a new class.
-fn eventful() -> Scratch {
+pub(super) fn eventful() -> Scratch {
     let scratch = Scratch::with_two_features();
     let bounds = BoxMm::from_mm([835_567_000, 817_816_000, 0], [835_600_000, 817_830_000, 30_000]).unwrap();
     let mut import = transaction(1);

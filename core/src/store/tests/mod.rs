@@ -1,8 +1,10 @@
 //! Tests of the store through its public door, and the maps they start from.
 
 mod commit;
+mod fixture;
 mod fsck;
 mod history;
+mod measure;
 mod open;
 
 use super::{CommitError, MapFile, NewMap};
