@@ -42,6 +42,11 @@ impl Frame {
         &self.ids[v * self.width..(v + 1) * self.width]
     }
 
+    /// Inverse depths of row `v`; 0 where nothing was drawn.
+    pub(super) fn inverse_depths(&self, v: usize) -> &[f32] {
+        &self.inverse_depths[v * self.width..(v + 1) * self.width]
+    }
+
     /// Draws triangle `id` where it is nearer than what is there; among equals the first drawn stays.
     pub(super) fn draw(&mut self, span: Span, id: u32) {
         let row = span.v * self.width;

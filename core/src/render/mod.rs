@@ -1,9 +1,11 @@
 //! The map as seen from a pose: a scene of triangles in local coordinates, a rasteriser for images and rays for single
 //! queries.
 
+mod clip;
 mod edges;
 mod frame;
 pub mod lidar;
+mod occlusion;
 pub mod panorama;
 mod plate;
 mod projection;

@@ -72,11 +72,12 @@ impl Projection {
             || outside(|view, corner| corner.y > view.height * corner.z))
     }
 
-    /// The same for the box of a cluster.
-    pub(super) fn may_see(&self, cluster: &Cluster) -> bool {
+    /// Depth of the nearest point of a cluster's box, metres; `None` when all of it is outside the image.
+    pub(super) fn nearest_depth_m(&self, cluster: &Cluster) -> Option<f64> {
         let low = Vector3::from(cluster.min.map(f64::from)) - self.centre;
         let high = Vector3::from(cluster.max.map(f64::from)) - self.centre;
         let largest = |form: &Vector3<f64>| form.component_mul(&low).sup(&form.component_mul(&high)).sum();
-        largest(&self.forward) >= NEAR_M && self.sides.iter().all(|side| largest(side) >= 0.0)
+        let may_show = largest(&self.forward) >= NEAR_M && self.sides.iter().all(|side| largest(side) >= 0.0);
+        may_show.then(|| -largest(&-self.forward))
     }
 }

@@ -4,6 +4,7 @@
 //! First pass: the nearest triangle per pixel. Second pass: classes, from the exact intersection of ray and plane.
 
 use super::frame::{Frame, Span};
+use super::occlusion::Occlusion;
 use super::projection::Projection;
 use super::scene::Scene;
 use super::setup::{HomogeneousTriangle, Setup};
@@ -20,7 +21,15 @@ pub struct Renderer {
     setups: Vec<Setup>,
     /// Of the setups with a texture that show.
     texels: Vec<Option<Texels>>,
+    occlusion: Occlusion,
+    /// Nearest depth and index of the clusters in the image.
+    order: Vec<(f32, u32)>,
 }
+
+/// Triangles drawn before it is first looked at what they hide: small scenes are drawn whole.
+const FIRST_LOOK: usize = 192;
+/// Growth of the number of triangles from one look to the next.
+const LOOK_GROWTH: usize = 3;
 
 impl Renderer {
     /// A renderer without buffers; they grow with the first image.
@@ -65,19 +74,44 @@ impl Renderer {
         visible
     }
 
-    /// First pass over the whole scene.
+    /// First pass over the whole scene, near clusters first; those hidden by what is drawn are left out. Of surfaces at
+    /// exactly the same depth the one whose cluster begins nearer shows.
     pub(super) fn draw(&mut self, scene: &Scene, camera: &Pinhole, projection: &Projection) {
         self.start(camera);
-        for cluster in scene.clusters().iter().filter(|cluster| projection.may_see(cluster)) {
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
+        order.extend(
+            (0_u32..).zip(scene.clusters()).filter_map(|(index, cluster)| {
+                projection.nearest_depth_m(cluster).map(|depth_m| (depth_m as f32, index))
+            }),
+        );
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut next_look = FIRST_LOOK;
+        for &(_, index) in &order {
+            let cluster = &scene.clusters()[index as usize];
+            if self.occlusion.hides(projection, cluster) {
+                continue;
+            }
             for triangle in cluster.triangles.clone() {
                 self.draw_triangle(scene, projection, triangle as u32);
             }
+            if self.setups.len() >= next_look {
+                self.occlusion.take(&self.frame);
+                next_look *= LOOK_GROWTH;
+            }
         }
+        self.order = order;
     }
 
-    /// Setup of the nearest triangle per pixel of row `v`.
-    pub(super) fn row(&self, v: usize) -> impl Iterator<Item = Option<&Setup>> {
-        self.frame.ids(v).iter().map(|&id| self.drawn(id))
+    /// Runs of row `v` where one triangle is nearest: first column, length, triangle.
+    pub(super) fn runs(&self, v: usize) -> impl Iterator<Item = (usize, usize, &Setup)> {
+        let mut next = 0;
+        self.frame.ids(v).chunk_by(|a, b| a == b).filter_map(move |run| {
+            let first = next;
+            next += run.len();
+            let index = (run[0] as usize).checked_sub(1)?;
+            Some((first, run.len(), self.setups.get(index)?))
+        })
     }
 
     /// Second pass.
@@ -115,13 +149,10 @@ impl Renderer {
         }
     }
 
-    fn drawn(&self, id: u32) -> Option<&Setup> {
-        (id as usize).checked_sub(1).and_then(|index| self.setups.get(index))
-    }
-
     fn start(&mut self, camera: &Pinhole) {
         self.frame.clear(camera.width() as usize, camera.height() as usize);
         self.setups.clear();
+        self.occlusion.clear();
     }
 
     fn draw_triangle(&mut self, scene: &Scene, projection: &Projection, triangle: u32) {

@@ -1,6 +1,8 @@
 //! The triangles of the map around a local origin: what the rasteriser and the rays see.
 
+use super::clip::{Corner, within_reach};
 use super::plate;
+use crate::crs::{LOCAL_LIMIT_M, LocalOrigin};
 use crate::mesh::{Mesh, Object, Surface};
 use nalgebra::Vector3;
 use resurvey_schema::service::ViewFeature;
@@ -50,7 +52,8 @@ pub struct Cluster {
 }
 
 impl Scene {
-    /// A scene around `origin`, which should lie near the cameras: at 2048 m from it an offset is exact to 0.12 mm.
+    /// A scene around `origin`, which should lie near the cameras: what is more than 2048 m from it along an axis is cut
+    /// off, and offsets are exact to 0.12 mm.
     /// Descriptors appear in the feature table in the order given, and later ones lie on top of earlier ones; without
     /// descriptors it is the base map alone. Sky is the class of that name in `classes`, void where there is none.
     pub fn new(
@@ -90,7 +93,7 @@ impl Scene {
         &self.positions
     }
 
-    /// Texture coordinates of the corners of every triangle; zero where its surface has no texture.
+    /// Texture coordinates of the corners of every triangle; without meaning where its surface has no texture.
     pub fn uvs(&self) -> &[[[f32; 2]; 3]] {
         &self.uvs
     }
@@ -175,14 +178,14 @@ impl Scene {
         let start = self.positions.len();
         let first_surface = self.surfaces.len() as u32;
         self.surfaces.extend(mesh.surfaces.iter().cloned());
-        let shift = self.offset(mesh.origin);
-        let corners: Vec<[f32; 3]> =
-            mesh.vertices.iter().map(|vertex| to_local(vertex.map(f64::from), shift)).collect();
+        let offsets: Vec<[f64; 3]> = {
+            let start = self.offset(mesh.origin);
+            let from_start = |vertex: &[f32; 3]| std::array::from_fn(|axis| start[axis] + f64::from(vertex[axis]));
+            mesh.vertices.iter().map(from_start).collect()
+        };
         for (triangle, &surface) in mesh.triangles.iter().zip(&mesh.triangle_surfaces) {
-            let triangle = triangle.map(|vertex| vertex as usize);
-            let textured = matches!(mesh.surfaces.get(usize::from(surface)), Some(Surface::Texture(_)));
-            let uvs = if textured { triangle.map(|vertex| uv_of(mesh, vertex)) } else { [[0.0; 2]; 3] };
-            self.push(triangle.map(|vertex| corners[vertex]), uvs, first_surface + u32::from(surface), 0);
+            let corner = |vertex: u32| Corner { offset: offsets[vertex as usize], uv: uv_of(mesh, vertex as usize) };
+            self.add_triangle(triangle.map(corner), first_surface + u32::from(surface), 0);
         }
         self.objects.push(SceneObject { fid, triangles: start..self.positions.len() });
         self.add_clusters(start);
@@ -199,19 +202,28 @@ impl Scene {
         let surface = self.surfaces.len() as u32;
         self.surfaces.push(Surface::Class(descriptor.class()));
         for triangle in triangles {
-            self.push(triangle.map(|corner| to_local(corner, [0.0; 3])), [[0.0; 2]; 3], surface, feature);
+            self.add_triangle(triangle.map(|offset| Corner { offset, uv: [0.0; 2] }), surface, feature);
         }
         self.add_clusters(start);
     }
 
-    /// Adds a triangle; one with a coordinate that is not a number is nowhere and is left out.
-    fn push(&mut self, corners: [[f32; 3]; 3], uvs: [[f32; 2]; 3], surface: u32, feature: u32) {
-        if corners.iter().flatten().all(|value| value.is_finite()) {
-            self.positions.push(corners);
-            self.uvs.push(uvs);
-            self.surface_indices.push(surface);
-            self.features.push(feature);
+    /// Adds the part of a triangle within 2048 m of the origin; one with a coordinate that is not a number is nowhere.
+    fn add_triangle(&mut self, corners: [Corner; 3], surface: u32, feature: u32) {
+        if corners.iter().flat_map(|corner| &corner.offset).all(|value| value.abs() <= LOCAL_LIMIT_M) {
+            self.push(corners, surface, feature);
+        } else {
+            within_reach(corners).into_iter().for_each(|part| self.push(part, surface, feature));
         }
+    }
+
+    fn push(&mut self, corners: [Corner; 3], surface: u32, feature: u32) {
+        // Fails for an origin that is not finite, around which there is nothing.
+        let Ok(origin) = LocalOrigin::new(self.origin) else { return };
+        let [Ok(a), Ok(b), Ok(c)] = corners.map(|corner| origin.to_local(origin.at(corner.offset))) else { return };
+        self.positions.push([a, b, c]);
+        self.uvs.push(corners.map(|corner| corner.uv.map(|value| value as f32)));
+        self.surface_indices.push(surface);
+        self.features.push(feature);
     }
 
     fn add_clusters(&mut self, start: usize) {
@@ -229,11 +241,6 @@ impl Scene {
     }
 }
 
-/// Offset from the scene's origin of a point `shift` away, rounded to f32 once.
-fn to_local(offset: [f64; 3], shift: [f64; 3]) -> [f32; 3] {
-    std::array::from_fn(|axis| (offset[axis] + shift[axis]) as f32)
-}
-
-fn uv_of(mesh: &Mesh, vertex: usize) -> [f32; 2] {
-    mesh.uvs.get(vertex).copied().unwrap_or_default()
+fn uv_of(mesh: &Mesh, vertex: usize) -> [f64; 2] {
+    mesh.uvs.get(vertex).copied().unwrap_or_default().map(f64::from)
 }

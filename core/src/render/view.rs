@@ -5,6 +5,7 @@ use super::projection::Projection;
 use super::raster::Renderer;
 use super::rays::RayCaster;
 use super::scene::Scene;
+use super::setup::Setup;
 use crate::camera::{Camera, Pinhole, world_from_camera};
 use crate::image::{LabelImage, Raster};
 use nalgebra::Vector3;
@@ -26,13 +27,12 @@ pub struct View {
     pub features: Raster<u32>,
 }
 
-/// One pixel of a view.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
-    pub(super) class: u8,
-    pub(super) range_m: f32,
-    pub(super) point: [f32; 3],
-    pub(super) feature: u32,
+/// One row of a view.
+struct Row<'a> {
+    labels: &'a mut [u8],
+    range_m: &'a mut [f32],
+    points: &'a mut [[f32; 3]],
+    features: &'a mut [u32],
 }
 
 /// The scene as `camera` sees it from `pose`. Pinhole cameras are rasterised, others cast a ray per pixel.
@@ -54,22 +54,16 @@ impl View {
         }
     }
 
-    /// Sets every pixel to what `pixel` finds, in parallel by rows.
-    fn fill<R: IntoIterator<Item = Option<Pixel>>>(&mut self, row: impl Fn(usize) -> R + Sync) {
+    /// Lets `write` fill the rows, in parallel.
+    fn fill(&mut self, write: impl Fn(usize, Row) + Sync) {
         let width = (self.labels.width() as usize).max(1);
         (self.labels.values_mut().par_chunks_mut(width))
             .zip(self.range_m.values_mut().par_chunks_mut(width))
             .zip(self.points.values_mut().par_chunks_mut(width))
             .zip(self.features.values_mut().par_chunks_mut(width))
             .enumerate()
-            .for_each(|(v, (((labels, ranges), points), features))| {
-                for (u, pixel) in row(v).into_iter().enumerate().take(width) {
-                    let Some(pixel) = pixel else { continue };
-                    labels[u] = pixel.class;
-                    ranges[u] = pixel.range_m;
-                    points[u] = pixel.point;
-                    features[u] = pixel.feature;
-                }
+            .for_each(|(v, (((labels, range_m), points), features))| {
+                write(v, Row { labels, range_m, points, features });
             });
     }
 }
@@ -80,25 +74,38 @@ fn rasterised(scene: &Scene, camera: &Pinhole, pose: &Pose) -> View {
     let mut view = View::empty(scene, camera.width(), camera.height());
     renderer.draw(scene, camera, &projection);
     renderer.shade(scene, &projection, &mut view.labels);
-    let labels = view.labels.clone();
-    view.fill(|v| {
-        let (projection, labels) = (&projection, labels.row(v as u32));
-        renderer.row(v).enumerate().map(move |(u, setup)| {
-            let setup = setup?;
-            let (x, y) = (u as f64 + 0.5, v as f64 + 0.5);
-            // The exact intersection of the ray with the triangle's plane.
-            let direction = projection.scene_from_pixels * Vector3::new(x, y, 1.0);
-            let depth_m = 1.0 / setup.inverse_depth_at(x, y);
-            let point = projection.centre + direction * depth_m;
-            Some(Pixel {
-                class: labels[u],
-                range_m: (direction.norm() * depth_m) as f32,
-                point: [point.x as f32, point.y as f32, point.z as f32],
-                feature: scene.feature(setup.triangle as usize),
-            })
-        })
+    view.fill(|v, row| {
+        for (first, length, setup) in renderer.runs(v) {
+            let run = first..first + length;
+            row.features[run.clone()].fill(scene.feature(setup.triangle as usize));
+            intersect(&projection, setup, [first, v], &mut row.range_m[run.clone()], &mut row.points[run]);
+        }
     });
     view
+}
+
+/// Range and point of the exact intersection of the triangle's plane with the rays of the pixels from column `u`, row
+/// `v` on.
+fn intersect(
+    projection: &Projection,
+    setup: &Setup,
+    [u, v]: [usize; 2],
+    ranges_m: &mut [f32],
+    points: &mut [[f32; 3]],
+) {
+    let y = v as f64 + 0.5;
+    let per_column = projection.scene_from_pixels.column(0).into_owned();
+    let first_direction = projection.scene_from_pixels * Vector3::new(u as f64 + 0.5, y, 1.0);
+    let [step, _, _] = setup.inverse_depth;
+    let start = setup.inverse_depth_at(u as f64 + 0.5, y);
+    for (index, (range_m, point)) in ranges_m.iter_mut().zip(points).enumerate() {
+        let along = f64::from(index as i32);
+        let direction = first_direction + per_column * along;
+        let depth_m = 1.0 / (start + step * along);
+        *range_m = (direction.norm() * depth_m) as f32;
+        let offset = projection.centre + direction * depth_m;
+        *point = [offset.x as f32, offset.y as f32, offset.z as f32];
+    }
 }
 
 /// Range from which a ray looks, metres; the counterpart of the rasteriser's least depth.
@@ -108,20 +115,18 @@ fn cast(scene: &Scene, camera: &Camera, pose: &Pose) -> View {
     let caster = RayCaster::new(scene);
     let world_from_camera = world_from_camera(pose);
     let mut view = View::empty(scene, camera.width(), camera.height());
-    view.fill(|v| {
-        let caster = &caster;
-        (0..camera.width()).map(move |u| {
-            let direction = world_from_camera * camera.ray(f64::from(u) + 0.5, v as f64 + 0.5)?;
+    view.fill(|v, row| {
+        for u in 0..camera.width() {
+            let Some(ray) = camera.ray(f64::from(u) + 0.5, v as f64 + 0.5) else { continue };
+            let direction = world_from_camera * ray;
             let start = Vector3::from(scene.offset(pose.position)) + direction * FIRST_RANGE_M;
-            let hit = caster.cast(scene.point(start.into()), direction.into(), f64::INFINITY)?;
-            let [x, y, z] = scene.offset(hit.point);
-            Some(Pixel {
-                class: hit.class.0,
-                range_m: (hit.range_m + FIRST_RANGE_M) as f32,
-                point: [x as f32, y as f32, z as f32],
-                feature: hit.feature,
-            })
-        })
+            let Some(hit) = caster.cast(scene.point(start.into()), direction.into(), f64::INFINITY) else { continue };
+            let u = u as usize;
+            row.labels[u] = hit.class.0;
+            row.range_m[u] = (hit.range_m + FIRST_RANGE_M) as f32;
+            row.points[u] = scene.offset(hit.point).map(|value| value as f32);
+            row.features[u] = hit.feature;
+        }
     });
     view
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::camera::world_from_camera;
-use crate::render::{RayCaster, view};
+use crate::render::{RayCaster, Renderer, view};
 use proptest::prelude::*;
 
 /// A disagreement is on an edge when the ray, moved by this many pixels, meets something else.
@@ -97,6 +97,36 @@ fn rasteriser_and_rays_agree_on_random_scenes_but_for_one_pixel_in_ten_thousand_
     let pixels = 24 * 128 * 96;
     println!("{differing} of {pixels} pixels differ");
     assert!(differing * 10_000 <= pixels, "{differing} of {pixels} pixels differ");
+}
+
+#[test]
+fn leaving_out_what_is_hidden_changes_no_pixel() {
+    for seed in 0..6 {
+        let mut random = Random(seed + 77);
+        // A city of walls: dense enough that most of it is hidden, and walls that start behind the camera.
+        let mut objects = clutter(seed);
+        objects.extend((0..900_u16).map(|index| {
+            let [east, north] = [random.between(-400.0, 400.0) as f32, random.between(-400.0, 400.0) as f32];
+            let (wide, deep, high) =
+                (random.between(-20.0, 20.0), random.between(-20.0, 20.0), random.between(1.0, 40.0));
+            let (wide, deep, high) = (wide as f32, deep as f32, high as f32 - 1.6);
+            let corners = [[0.0, 0.0], [wide, deep], [wide, deep], [0.0, 0.0]];
+            let up = [-1.6, -1.6, high, high];
+            quad(
+                std::array::from_fn(|k| [east + corners[k][0], north + corners[k][1], up[k]]),
+                class((index % 9) as u8),
+            )
+        }));
+        let scene = scene(&objects);
+        let all: Vec<u32> = (0..scene.positions().len() as u32).collect();
+        let here = pose([1.0, 2.0, 0.3], random.between(0.0, 360.0), random.between(-20.0, 20.0));
+        let pinhole = camera().pinhole().unwrap();
+        let (mut renderer, mut culled, mut whole) =
+            (Renderer::new(), LabelImage::filled(1, 1, 0), LabelImage::filled(1, 1, 0));
+        renderer.render_labels(&scene, &pinhole, &here, &mut culled);
+        renderer.render_labels_of((&scene, &all), &pinhole, &here, &mut whole);
+        assert!(culled == whole, "seed {seed}");
+    }
 }
 
 #[test]

@@ -157,6 +157,53 @@ fn what_is_nearer_than_5_cm_is_not_drawn() {
 }
 
 #[test]
+fn what_is_more_than_2048_m_from_the_origin_is_cut_off() {
+    let plain = quad(
+        [[-2000.0, 0.0, -1.0], [2000.0, 0.0, -1.0], [2000.0, 1900.0, -1.0], [-2000.0, 1900.0, -1.0]],
+        class(STONE),
+    );
+    let mut far = plain.clone();
+    far.mesh.origin.northing_m += 1000.0;
+    let beyond = wall(2040.0, [-9.0, 9.0], [-9.0, 9.0], class(GLASS));
+    let mut away = beyond.clone();
+    away.mesh.origin.northing_m += 9.0;
+    let scene = scene(&[plain, far, beyond, away]);
+    let north = scene.positions().iter().flatten().map(|corner| corner[1]).fold(0.0, f32::max);
+    assert!((2047.9..=2048.0).contains(&north), "the plain that reaches 2900 m ends at {north} m");
+    assert_eq!(scene.objects()[3].triangles.len(), 0, "a wall at 2049 m");
+    let area = |triangle: &[[f32; 3]; 3]| {
+        let [a, b, c] = triangle.map(|[east, north, _]| [f64::from(east), f64::from(north)]);
+        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs() / 2.0
+    };
+    let cut: f64 = scene.positions()[scene.objects()[1].triangles.clone()].iter().map(area).sum();
+    assert!((cut - 4000.0 * 1048.0).abs() < 1.0, "{cut} m² are left of the plain");
+}
+
+#[test]
+fn a_texture_keeps_its_place_on_a_surface_that_is_cut_off() {
+    // 4000 m of road in 4 bands of 1000 m, of which 2048 m are near enough: the seams stay at 1000 m and 2000 m.
+    let road = quad(
+        [[-5.0, 0.0, -1.0], [5.0, 0.0, -1.0], [5.0, 4000.0, -1.0], [-5.0, 4000.0, -1.0]],
+        texture(&[[3], [2], [1], [0]]),
+    );
+    let scene = scene(&[road]);
+    let caster = RayCaster::new(&scene);
+    for (north, expected) in [(10.0, 0), (999.0, 0), (1001.0, 1), (1999.0, 1), (2001.0, 2)] {
+        assert_eq!(caster.ground_below(at([0.5, north, 3.0])).unwrap().class, ClassId(expected), "{north} m");
+    }
+    assert_eq!(caster.ground_below(at([0.5, 2049.0, 3.0])), None);
+}
+
+#[test]
+fn around_an_origin_that_is_not_a_place_there_is_nothing() {
+    let object = wall(8.0, [-2.0, 3.0], [-1.0, 2.0], class(STONE));
+    let origin = GridPoint::new(f64::NAN, 0.0, 0.0);
+    let scene = Scene::new(origin, &[(0, &object)], &[], &ClassTable::default());
+    assert!(scene.positions().is_empty());
+    assert_eq!(count(&view(&scene, &camera(), &pose([0.0; 3], 0.0, 0.0)).labels, SKY), 128 * 96);
+}
+
+#[test]
 fn a_renderer_gives_the_same_image_whatever_it_drew_before() {
     let objects = [wall(8.0, [-2.0, 3.0], [-1.0, 2.0], texture(&[[0, 1], [2, 3]]))];
     let scene = scene(&objects);
