@@ -257,6 +257,15 @@ fn a_file_that_is_not_on_the_list_is_refused_by_name_with_its_digest() {
     assert_eq!(message, expected);
 }
 
+#[test]
+fn a_file_can_be_inspected_before_it_is_allowed() {
+    let Some(fixtures) = fixtures() else { return };
+    // The constructor would abort: inspecting runs no code.
+    let path = fixtures.broken("inspected", &["-DCONSTRUCTOR"]);
+    let info = Registry::inspect(&path).unwrap();
+    assert_eq!((info.name.as_str(), info.sha256, info.settings_schema), ("broken", digest(&path), None));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_file_or_directory_that_everybody_may_write_is_refused() {

@@ -365,7 +365,7 @@ typedef struct rsv_table {
    * "integer" | "boolean" | "string", "default": ..., "minimum", "maximum", "enum", "description"}, ...}}. Empty: no
    * settings. Lives as long as the library. */
   rsv_text settings_schema;
-  /* settings is a JSON object with every setting of the schema, checked. */
+  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. */
   rsv_status (*create)(rsv_text settings, rsv_instance **instance, rsv_error *error);
   /* Once per instance; also after RSV_PANICKED. */
   void (*destroy)(rsv_instance *instance);

@@ -20,7 +20,7 @@ pub fn metadata() -> Value {
 }
 
 /// The arrows of `docs/architecture.md`: package, and the packages of this workspace that it is built from.
-pub const ARROWS: [(&str, &[&str]); 8] = [
+pub const ARROWS: [(&str, &[&str]); 9] = [
     (
         "resurvey",
         &[
@@ -35,6 +35,7 @@ pub const ARROWS: [(&str, &[&str]); 8] = [
     ("resurvey-class-difference", &["resurvey-plugin"]),
     ("resurvey-core", &["resurvey-schema"]),
     ("resurvey-descriptors", &["resurvey-plugin"]),
+    ("resurvey-fixtures", &["resurvey-plugin"]),
     ("resurvey-plugin", &["resurvey-schema"]),
     ("resurvey-schema", &[]),
     ("resurvey-semantic", &["resurvey-plugin"]),

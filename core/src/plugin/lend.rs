@@ -227,3 +227,52 @@ pub(super) fn descriptor(descriptor: &Descriptor) -> abi::Descriptor {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shorter_struct_reads_as_zero_where_it_ends() {
+        let sent = abi::Region { size: 16, left: 3, top: 5, right: 7, ..abi::Region::new() };
+        // SAFETY: a whole region is readable, more than its size says.
+        let read = unsafe { read_growing(&raw const sent) }.unwrap();
+        assert_eq!((read.left, read.top, read.right), (3, 5, 0));
+    }
+
+    #[test]
+    fn a_longer_struct_is_read_as_far_as_it_is_known() {
+        #[repr(C)]
+        struct Longer {
+            known: abi::RenderRequest,
+            later: [u64; 4],
+        }
+        let known = abi::RenderRequest { size: size_of::<Longer>() as u32, stride: 4, ..abi::RenderRequest::new() };
+        let sent = Longer { known, later: [u64::MAX; 4] };
+        // SAFETY: the size that the struct says is readable.
+        let read = unsafe { read_growing((&raw const sent).cast::<abi::RenderRequest>()) }.unwrap();
+        assert_eq!((read.stride, read.with_descriptors, read.reserved), (4, 0, 0));
+        assert_eq!(sent.later[3], u64::MAX);
+    }
+
+    #[test]
+    fn null_and_impossible_arrays_are_none() {
+        let numbers = [1_u32, 2, 3];
+        // SAFETY: null, or never read because the length is impossible, or three readable numbers.
+        unsafe {
+            assert!(read_growing(std::ptr::null::<abi::Region>()).is_none());
+            assert!(slice(std::ptr::null::<u32>(), 1).is_none());
+            assert!(slice(numbers.as_ptr(), usize::MAX).is_none());
+            assert!(slice(numbers.as_ptr().byte_add(1), 1).is_none());
+            assert_eq!(slice(numbers.as_ptr(), 3), Some(&numbers[..]));
+            assert_eq!(slice(std::ptr::null::<u32>(), 0), Some(&[][..]));
+        }
+    }
+
+    #[test]
+    fn a_text_that_is_not_utf_8_is_none() {
+        let bytes = [0xff_u8, b'a'];
+        // SAFETY: two readable bytes.
+        assert!(unsafe { text(abi::Text { data: bytes.as_ptr(), length: 2 }) }.is_none());
+    }
+}

@@ -126,6 +126,15 @@ impl Registry {
         Err(PluginError::Unknown { name: name.to_owned(), known })
     }
 
+    /// What the library at `path` says of itself, whether or not it may be loaded; runs no code of it.
+    pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
+        let found = read(path).and_then(|(path, bytes)| {
+            let declared = read_library(&bytes)?;
+            Ok(Candidate { path, sha256: Digest::of(&bytes), declared }.info())
+        });
+        found.map_err(|fault| refusal(path, fault).into())
+    }
+
     /// The plugin in the library at `path`, under the same rules.
     pub fn load_file(&self, path: &Path) -> Result<Plugin, PluginError> {
         let opened = examine(path, &self.allowed).1.and_then(|candidate| {
@@ -153,17 +162,7 @@ impl Candidate {
 
 /// Passes the gates that need no code of the file to run; also gives the name, where it can be read.
 fn examine(path: &Path, allowed: &HashSet<Digest>) -> (Option<String>, Result<Candidate, Fault>) {
-    let unreadable = |error: std::io::Error| (Stage::File, error.to_string(), "check path and permissions".to_owned());
-    let read = || {
-        // The system looks along its own search path for a name without a directory: open the real path alone.
-        let path = path.canonicalize().map_err(unreadable)?;
-        if !path.metadata().map_err(unreadable)?.is_file() {
-            return Err((Stage::File, "not a file".to_owned(), "name a library".to_owned()));
-        }
-        let bytes = std::fs::read(&path).map_err(unreadable)?;
-        Ok((path, bytes))
-    };
-    let (path, bytes) = match read() {
+    let (path, bytes) = match read(path) {
         Ok(read) => read,
         Err(fault) => return (None, Err(fault)),
     };
@@ -174,6 +173,18 @@ fn examine(path: &Path, allowed: &HashSet<Digest>) -> (Option<String>, Result<Ca
         .and(declared)
         .map(|declared| Candidate { path, sha256, declared });
     (name, outcome)
+}
+
+/// The real path and the bytes of a file.
+fn read(path: &Path) -> Result<(PathBuf, Vec<u8>), Fault> {
+    let unreadable = |error: std::io::Error| (Stage::File, error.to_string(), "check path and permissions".to_owned());
+    // The system looks along its own search path for a name without a directory: open the real path alone.
+    let path = path.canonicalize().map_err(unreadable)?;
+    if !path.metadata().map_err(unreadable)?.is_file() {
+        return Err((Stage::File, "not a file".to_owned(), "name a library".to_owned()));
+    }
+    let bytes = std::fs::read(&path).map_err(unreadable)?;
+    Ok((path, bytes))
 }
 
 fn refusal(path: &Path, (stage, reason, advice): Fault) -> Refusal {

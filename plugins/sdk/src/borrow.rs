@@ -254,3 +254,79 @@ pub(crate) fn descriptor(from: &abi::Descriptor) -> Result<Descriptor, Error> {
         kind => Err(Error(format!("the host has descriptors of kind {kind}, which this plugin does not know"))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_older_host_s_services_read_as_missing() {
+        extern "C" fn nobody(_: *mut core::ffi::c_void) -> u32 {
+            7
+        }
+        let all = abi::Services { cancelled: Some(nobody), ..abi::Services::new() };
+        // SAFETY: a whole table is readable.
+        assert!(unsafe { growing(&raw const all) }.unwrap().cancelled.is_some());
+        let older = abi::Services { size: std::mem::offset_of!(abi::Services, cancelled) as u32, ..all };
+        // SAFETY: as above.
+        assert!(unsafe { growing(&raw const older) }.unwrap().cancelled.is_none());
+    }
+
+    #[test]
+    fn an_answer_fills_a_place_as_far_as_the_host_knows_it() {
+        let answer = abi::Localization { score: 0.5, skipped: 9, ..abi::Localization::new() };
+        let size = std::mem::offset_of!(abi::Localization, skipped) as u32;
+        let mut place = abi::Localization { size, skipped: 1, ..abi::Localization::default() };
+        // SAFETY: a whole place is writable.
+        unsafe { fill(&raw mut place, &answer) }.unwrap();
+        assert_eq!((place.size, place.skipped), (size, 1));
+        assert!((place.score - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn padded_rows_are_read_without_their_padding() {
+        let data = [1_u16, 2, 99, 3, 4];
+        let padded = abi::Image { data: data.as_ptr().cast(), width: 2, height: 2, row_bytes: 6 };
+        // SAFETY: two rows of two values, six bytes apart, are readable.
+        let image = unsafe { image::<u16>(&padded) }.unwrap();
+        assert_eq!((image.row(0), image.row(1)), (&[1, 2][..], &[3, 4][..]));
+    }
+
+    #[test]
+    fn an_image_that_cannot_be_is_refused() {
+        let data = [0_u16; 8];
+        for (width, height, row_bytes) in [(2, 2, 3), (2, 2, 2), (2, u32::MAX, usize::MAX - 1)] {
+            let broken = abi::Image { data: data.as_ptr().cast(), width, height, row_bytes };
+            // SAFETY: refused before anything is read.
+            assert!(unsafe { image::<u16>(&broken) }.is_err(), "{width} {height} {row_bytes}");
+        }
+        let nothing = abi::Image::default();
+        // SAFETY: an image without pixels needs no memory.
+        assert_eq!(unsafe { image::<u16>(&nothing) }.unwrap().height(), 0);
+    }
+
+    #[test]
+    fn regions_of_a_newer_host_are_found_at_its_own_step() {
+        #[repr(C)]
+        struct Longer {
+            known: abi::Region,
+            later: u64,
+        }
+        let mask = [1_u8];
+        let region = |left| abi::Region {
+            size: size_of::<Longer>() as u32,
+            left,
+            right: left + 1,
+            bottom: 1,
+            pixels: 1,
+            mask: mask.as_ptr(),
+            mask_length: 1,
+            ..abi::Region::new()
+        };
+        let sent = [4, 8].map(|left| Longer { known: region(left), later: u64::MAX });
+        // SAFETY: two regions, one `Longer` apart, with their masks.
+        let read = unsafe { regions(sent.as_ptr().cast(), 2, size_of::<Longer>()) }.unwrap();
+        assert_eq!(read.iter().map(|region| region.bounds.left).collect::<Vec<_>>(), [4, 8]);
+        assert_eq!(sent[1].later, u64::MAX);
+    }
+}
