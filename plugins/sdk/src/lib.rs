@@ -25,3 +25,8 @@ pub use resurvey_schema as schema;
 pub use resurvey_schema::service::{
     ClassCounts, ClassSet, CompareRequest, Level, PanoramaRequest, PoseEstimate, Prior, RayHit, ViewCounts, ViewFeature,
 };
+
+/// The code of the guide, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/plugin-guide.md")]
+mod guide {}
