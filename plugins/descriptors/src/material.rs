@@ -60,7 +60,10 @@ pub fn measure(sight: &Sight<'_>, region: &ChangeRegion, outline: &Outline) -> R
     if !sight.settings.allow_partly_hidden {
         at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
     }
-    let quad = quad::fit(&edge).ok_or(shapeless)?;
+    let Some(quad) = quad::fit(&edge) else {
+        at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
+        return Err(shapeless.into());
+    };
     let seen = quad.visible.iter().copied().fold(1.0, f64::min);
     let min_seen = sight.settings.min_side_visible;
     if hidden_share > HIDDEN_NOISE {
@@ -199,7 +202,8 @@ impl Measurement<'_> {
         at_most("rectangle", rectangle::angle_difference_deg(corners), limit_deg, "deg")
     }
 
-    /// Requires that the region fills the quadrilateral, what something nearer hides aside, and does not reach beyond.
+    /// Requires that region and quadrilateral are nearly the same, what something nearer hides aside: pixels of both
+    /// over pixels of either, so that a round region is refused whatever square is laid on it.
     fn fills(&self) -> Result<(), Stop> {
         let bounds = self.outline.bounds;
         let margin = |size: u32| i64::from(size / 4 + 4);
@@ -229,7 +233,7 @@ impl Measurement<'_> {
         let settings = self.sight.settings;
         let share = |part: f64, rest: f64| part / f64::max(part + rest, 1.0);
         at_most("captured-entirely", share(hidden, filled + empty), 1.0 - settings.min_side_visible, "ratio")?;
-        at_least("rectangle", share(filled, empty).min(share(filled, beyond)), settings.min_fill, "ratio")?;
+        at_least("rectangle", share(filled, empty + beyond), settings.min_fill, "ratio")?;
         Ok(())
     }
 

@@ -27,7 +27,7 @@ pub const SCHEMA: &str = r#"{
     "max_angle_difference_deg": { "type": "number", "minimum": 0, "maximum": 45, "default": 10.0,
       "description": "largest difference of an angle from 90 degrees, deg" },
     "min_fill": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.85,
-      "description": "smallest share of the quadrilateral that the region fills" },
+      "description": "pixels of both the region and its quadrilateral over pixels of either, at least" },
     "label_jitter_px": { "type": "number", "minimum": 0, "maximum": 50, "default": 2.0,
       "description": "1-sigma by which contours of the photo's labels wander, px" },
     "allow_partly_hidden": { "type": "boolean", "default": true,
