@@ -21,6 +21,3 @@ pub use detector::ClassDifference;
 pub use settings::Settings;
 
 resurvey_plugin::export_detector!(ClassDifference);
-
-#[cfg(test)]
-mod tests;

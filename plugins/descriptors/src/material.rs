@@ -130,7 +130,8 @@ fn inner_share(sight: &Sight<'_>, outline: &Outline, centre: &Vector2<f64>) -> f
     let focal_px = sight.comparison.camera.fx.max(sight.comparison.camera.fy);
     let shift_px = focal_px * (position_m / range_m.max(0.1)).hypot(angle_rad);
     let shorter_px = f64::from(outline.bounds.width().min(outline.bounds.height()));
-    (1.0 - 2.0 * POSE_SIGMAS * shift_px / shorter_px).clamp(MIN_INNER, 1.0)
+    let share = 1.0 - 2.0 * POSE_SIGMAS * shift_px / shorter_px;
+    if share.is_finite() { share.clamp(MIN_INNER, 1.0) } else { MIN_INNER }
 }
 
 impl Measurement<'_> {

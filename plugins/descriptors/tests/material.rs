@@ -15,7 +15,7 @@ fn refused(map: resurvey_plugin::toy::ToyScene, photo: Vec<u8>, requirement: &st
     let (_, proposals) = update(map, photo, known(pose()));
     assert!(placed(&proposals).is_empty(), "{proposals:?}");
     let rejection = rejected(&proposals).into_iter().find(|rejection| rejection.class_after == BANNER);
-    let rejection = rejection.unwrap_or_else(|| panic!("nothing refused: {proposals:?}"));
+    let rejection = rejection.expect("the banner is refused");
     assert_eq!((rejection.requirement.as_str(), rejection.unit.as_str()), (requirement, unit), "{rejection:?}");
     (rejection.measured, rejection.limit)
 }
@@ -195,4 +195,27 @@ fn a_rolled_and_turned_camera_measures_the_same_banner() {
     assert_eq!(banner.class, ClassId(3));
     assert!(distance_m(&banner.centre(), &at(9.0, FACADE_M, 7.0)) < 0.05);
     assert!((measures(banner)[2] / 24.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_covariance_of_nan_is_refused_as_uncertain() {
+    let mut unknown = known(pose());
+    unknown.covariance = [[f64::NAN; 3]; 3];
+    let (_, proposals) = update(street(), banner_capture(0.0, 7.0), unknown);
+    assert!(placed(&proposals).is_empty());
+    assert_eq!(rejected(&proposals)[0].requirement, "uncertain");
+}
+
+#[test]
+fn a_mask_that_does_not_fit_its_bounds_is_an_error_that_says_so() {
+    use resurvey_plugin::schema::{ChangeRegion, PixelBox};
+    use resurvey_plugin::{Estimator, Plugin};
+    let host = resurvey_plugin::toy::ToyHost::new(street(), camera());
+    let capture = host.capture(banner_capture(0.0, 7.0), known(pose()));
+    let bounds = PixelBox { left: 900, top: 700, right: 970, bottom: 710 };
+    let region = ChangeRegion { class_before: STONE, class_after: BANNER, bounds, mask: vec![1; 700], pixels: 700 };
+    let settings = settings::<resurvey_descriptors::Descriptors>(&[]);
+    let mut estimator = resurvey_descriptors::Descriptors::create(settings).unwrap();
+    let error = estimator.estimate(&host, &capture.comparison(), &[region]).unwrap_err();
+    assert!(error.0.contains("region 0") && error.0.contains("960×720"), "{error}");
 }

@@ -1,5 +1,6 @@
 //! A street in the toy world: a façade of stone with glass windows 20 m north of the camera, a pavement before it.
-#![allow(dead_code)]
+// Each test file uses a part of it, and a helper of tests may panic.
+#![allow(dead_code, clippy::unwrap_used, clippy::panic)]
 
 use resurvey_class_difference::ClassDifference;
 use resurvey_descriptors::Descriptors;
