@@ -1,5 +1,6 @@
 //! The paper's equations through detector and estimator together, on analytic scenes: a wall at a known distance, a
 //! photo from one pose and a view from another. The oracles are geometry, not earlier results.
+#![allow(clippy::panic)]
 
 use resurvey_class_difference::ClassDifference;
 use resurvey_descriptors::Descriptors;

@@ -22,7 +22,8 @@ pub fn run(options: &Export, console: &mut Console<'_>) -> Result<u8, Failure> {
         Some(bounds) => snapshot.features_in(&bounds)?,
         None => snapshot.features()?,
     };
-    let (mut objects, mut descriptors): (Vec<(u64, Object)>, Vec<(u64, Descriptor)>) = Default::default();
+    let mut objects: Vec<(u64, Object)> = Vec::new();
+    let mut descriptors: Vec<(u64, Descriptor)> = Vec::new();
     for feature in features {
         let fid = feature.fid.0;
         match feature.state {
