@@ -96,12 +96,15 @@ impl PositionPhoto {
         let headings = self.request.yaw_count as usize;
         let column_rad = std::f64::consts::TAU / f64::from(self.request.columns);
         let first = (self.request.first_yaw_rad / column_rad).round() as i64;
-        let blank = || (self.grid.frame(), ClassPlanes::new(&self.grid, self.classes));
+        let wanted = self.photo.wanted(first, self.request.yaw_step_columns, self.request.yaw_count);
+        let blank = || (self.grid.frame(), ClassPlanes::new(&self.grid, self.classes), vec![0; self.grid.rows()]);
         let per_position = positions.par_iter().zip(counts.par_chunks_mut((headings * self.classes).max(1)));
-        per_position.for_each_init(blank, |(frame, planes), (position, counts)| {
-            self.grid.draw_scene(frame, scene, scene.offset(*position));
-            let class_at = |column, row| Some(self.grid.class_at(frame, scene, column, row).0);
-            planes.fill(&self.grid, &self.request.ignored_in_view, class_at);
+        per_position.for_each_init(blank, |(frame, planes, classes), (position, counts)| {
+            self.grid.draw_scene(frame, scene, scene.offset(*position), &wanted);
+            for column in (0..self.grid.columns()).filter(|&column| wanted[column]) {
+                self.grid.classes(frame, scene, column, classes);
+                planes.fill_column(column, classes, &self.request.ignored_in_view);
+            }
             for (heading, counts) in counts.chunks_mut(self.classes).enumerate() {
                 let column = first + heading as i64 * i64::from(self.request.yaw_step_columns);
                 self.photo.counts(planes, column, counts);

@@ -22,32 +22,24 @@ impl ClassPlanes {
         Self { words, planes: vec![vec![0; length]; classes], compared: vec![0; length] }
     }
 
-    /// Sets every cell to the class that `class_of(column, row)` returns; `None`, void and `ignored` classes take no part.
-    pub fn fill(
-        &mut self,
-        grid: &PanoramaGrid,
-        ignored: &ClassSet,
-        mut class_of: impl FnMut(usize, usize) -> Option<u8>,
-    ) {
-        let half = grid.columns() * self.words;
-        for column in 0..grid.columns() {
-            for word in 0..self.words {
-                let index = column * self.words + word;
-                self.planes.iter_mut().for_each(|plane| plane[index] = 0);
-                let mut compared = 0;
-                for bit in 0..ROWS_PER_WORD {
-                    let Some(class) = class_of(column, word * ROWS_PER_WORD + bit) else { continue };
-                    if usize::from(class) < self.planes.len() && !ignored.contains(ClassId(class)) {
-                        self.planes[usize::from(class)][index] |= 1 << bit;
-                        compared |= 1 << bit;
-                    }
+    /// Sets the cells of one column to `classes`, lowest row first; void, `ignored` and unknown classes take no part.
+    pub fn fill_column(&mut self, column: usize, classes: &[u8], ignored: &ClassSet) {
+        let half = self.compared.len() / 2;
+        for (word, classes) in classes.chunks(ROWS_PER_WORD).enumerate() {
+            let index = column * self.words + word;
+            self.planes.iter_mut().for_each(|plane| plane[index] = 0);
+            self.compared[index] = 0;
+            let mut bit = 0;
+            for run in classes.chunk_by(|a, b| a == b) {
+                let bits = (u64::MAX >> (ROWS_PER_WORD - run.len())) << bit;
+                bit += run.len();
+                if usize::from(run[0]) < self.planes.len() && !ignored.contains(ClassId(run[0])) {
+                    self.planes[usize::from(run[0])][index] |= bits;
+                    self.compared[index] |= bits;
                 }
-                self.compared[index] = compared;
             }
-        }
-        for plane in self.planes.iter_mut().chain([&mut self.compared]) {
-            let (first, second) = plane.split_at_mut(half);
-            second.copy_from_slice(first);
+            self.compared[half + index] = self.compared[index];
+            self.planes.iter_mut().for_each(|plane| plane[half + index] = plane[index]);
         }
     }
 }
@@ -70,10 +62,14 @@ impl PanoramaPhoto {
         grid: &PanoramaGrid,
         classes: usize,
         ignored: &ClassSet,
-        class_at: impl FnMut(usize, usize) -> Option<u8>,
+        class_at: impl Fn(usize, usize) -> Option<u8>,
     ) -> Self {
         let mut planes = ClassPlanes::new(grid, classes);
-        planes.fill(grid, ignored, class_at);
+        for column in 0..grid.columns() {
+            let classes: Vec<u8> =
+                (0..grid.rows()).map(|row| class_at(column, row).unwrap_or(ClassId::VOID.0)).collect();
+            planes.fill_column(column, &classes, ignored);
+        }
         let columns = grid.columns();
         let words = planes.words;
         let seen_at = |column: isize| {
@@ -85,6 +81,18 @@ impl PanoramaPhoto {
         let end = (-half..columns as isize - half).rev().find(|&column| seen_at(column)).map_or(first, |last| last + 1);
         let present = planes.planes.iter().map(|plane| plane.iter().any(|&word| word != 0)).collect();
         Self { planes, columns, seen: first..end, present }
+    }
+
+    /// The columns of a view that take part at the headings from column `first` on, every `step`, `count` in all.
+    pub fn wanted(&self, first: i64, step: u32, count: u32) -> Vec<bool> {
+        let mut wanted = vec![false; self.columns];
+        for heading in 0..i64::from(count) {
+            for column in self.seen.clone() {
+                let column = first + heading * i64::from(step) + column as i64;
+                wanted[column.rem_euclid(self.columns as i64) as usize] = true;
+            }
+        }
+        wanted
     }
 
     /// Counts per class against `view` at the heading of column `heading`; boundary counts stay zero.
@@ -109,4 +117,51 @@ impl PanoramaPhoto {
 
 fn common(a: &[u64], b: &[u64]) -> u32 {
     a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heading_is_a_shift_of_columns() {
+        let grid = PanoramaGrid::new(8, 1, -1.0, 1.0);
+        // The photo sees three columns: class 0, 1, 1 around its heading; below row 32 nothing.
+        let seen = |column: usize, row: usize| match column {
+            7 if row >= 32 => Some(0),
+            0 | 1 if row >= 32 => Some(1),
+            _ => None,
+        };
+        let photo = PanoramaPhoto::new(&grid, 2, &ClassSet::default(), seen);
+        let mut view = ClassPlanes::new(&grid, 2);
+        for column in 0..8 {
+            let class = u8::from(matches!(column, 4 | 5));
+            view.fill_column(column, &[class; 64], &ClassSet::default());
+        }
+        let both = |heading: i64| {
+            let mut counts = vec![ClassCounts::default(); 2];
+            photo.counts(&view, heading, &mut counts);
+            (counts[0].both, counts[1].both, counts[1].photo, counts[1].view)
+        };
+        assert_eq!(both(4), (32, 64, 64, 64), "heading of column 4: all agrees");
+        assert_eq!(both(0), (32, 0, 64, 0), "heading north: the view has no class 1 there");
+        assert_eq!(both(-4), both(4), "headings wrap");
+        assert_eq!(photo.wanted(4, 1, 1), [false, false, false, true, true, true, false, false]);
+    }
+
+    #[test]
+    fn void_and_ignored_cells_take_no_part() {
+        let grid = PanoramaGrid::new(4, 1, -1.0, 1.0);
+        let photo = PanoramaPhoto::new(&grid, 2, &ClassSet::default(), |_, row| Some(if row < 16 { 255 } else { 1 }));
+        let mut ignored = ClassSet::default();
+        ignored.insert(ClassId(0));
+        let mut view = ClassPlanes::new(&grid, 2);
+        for column in 0..4 {
+            let classes: Vec<u8> = (0..64).map(|row| u8::from(row >= 32)).collect();
+            view.fill_column(column, &classes, &ignored);
+        }
+        let mut counts = vec![ClassCounts::default(); 2];
+        photo.counts(&view, 0, &mut counts);
+        assert_eq!((counts[1].photo, counts[1].view, counts[1].both, counts[0].view), (4 * 32, 4 * 32, 4 * 32, 0));
+    }
 }

@@ -27,7 +27,7 @@ pub struct PanoramaGrid {
 pub struct PanoramaFrame {
     /// Inverse horizontal distance of the nearest surface, column by column, 1/m; 0 is sky.
     nearness: Vec<f32>,
-    /// Index of the nearest cone.
+    /// Index of the nearest cone; beyond all of them in sky.
     nearest: Vec<u32>,
     cones: Vec<Cone>,
 }
@@ -75,12 +75,12 @@ impl PanoramaGrid {
         PanoramaFrame { nearness: vec![0.0; cells], nearest: vec![0; cells], cones: Vec::new() }
     }
 
-    /// Draws all triangles of `scene` as seen from `eye`, an offset from the scene's origin.
-    pub fn draw_scene(&self, frame: &mut PanoramaFrame, scene: &Scene, eye: [f64; 3]) {
+    /// Draws all triangles of `scene` as seen from `eye`, an offset from the scene's origin, into the `wanted` columns.
+    pub fn draw_scene(&self, frame: &mut PanoramaFrame, scene: &Scene, eye: [f64; 3], wanted: &[bool]) {
         let eye = Vector3::from(eye);
         let from_eye = |corner: &[f32; 3]| Vector3::from(corner.map(f64::from)) - eye;
         let triangles = scene.positions().iter().enumerate();
-        self.draw(frame, triangles.map(|(id, corners)| (id as u32, corners.each_ref().map(from_eye))));
+        self.draw(frame, triangles.map(|(id, corners)| (id as u32, corners.each_ref().map(from_eye))), wanted);
         for cone in &mut frame.cones {
             if matches!(scene.surface(cone.triangle as usize), Surface::Texture(_)) {
                 cone.uv = Some(cone.uv_gradients(&scene.uvs()[cone.triangle as usize]));
@@ -88,29 +88,47 @@ impl PanoramaGrid {
         }
     }
 
-    /// Class in the cell at `column`, `row` of a frame that [`draw_scene`](Self::draw_scene) drew from `scene`.
-    pub fn class_at(&self, frame: &PanoramaFrame, scene: &Scene, column: usize, row: usize) -> ClassId {
-        let cell = column * self.rows + row;
-        let nearness = frame.nearness[cell];
-        if nearness <= 0.0 {
-            return scene.sky();
+    /// Classes of one column, lowest row first, of a frame that [`draw_scene`](Self::draw_scene) drew from `scene`.
+    pub fn classes(&self, frame: &PanoramaFrame, scene: &Scene, column: usize, classes: &mut [u8]) {
+        let cells = column * self.rows..(column + 1) * self.rows;
+        let nearness = &frame.nearness[cells.clone()];
+        let mut row = 0;
+        for run in frame.nearest[cells].chunk_by(|a, b| a == b) {
+            let rows = row..row + run.len();
+            row = rows.end;
+            let Some(cone) = frame.cones.get(run[0] as usize) else {
+                classes[rows].fill(scene.sky().0);
+                continue;
+            };
+            match cone.uv {
+                None => classes[rows].fill(scene.class_at(cone.triangle as usize, [0.0; 2]).0),
+                Some(gradients) => {
+                    let [sin, cos] = self.columns[column];
+                    let level = gradients.map(|gradient| gradient.x * sin + gradient.y * cos);
+                    for row in rows {
+                        let distance_m = 1.0 / f64::from(nearness[row]);
+                        let at = |axis: usize| (level[axis] + gradients[axis].z * self.tangent(row)) * distance_m;
+                        classes[row] = scene.class_at(cone.triangle as usize, [at(0) as f32, at(1) as f32]).0;
+                    }
+                }
+            }
         }
-        let cone = &frame.cones[frame.nearest[cell] as usize];
-        let uv = cone.uv.map_or([0.0; 2], |gradients| {
-            let direction = self.direction(column, row);
-            gradients.map(|gradient| (gradient.dot(&direction) / f64::from(nearness)) as f32)
-        });
-        scene.class_at(cone.triangle as usize, uv)
     }
 
     /// Draws triangles given as corners relative to the eye (E, N, H, metres); the nearest wins, the first among equals.
-    fn draw(&self, frame: &mut PanoramaFrame, triangles: impl Iterator<Item = (u32, [Vector3<f64>; 3])>) {
+    fn draw(
+        &self,
+        frame: &mut PanoramaFrame,
+        triangles: impl Iterator<Item = (u32, [Vector3<f64>; 3])>,
+        wanted: &[bool],
+    ) {
         frame.nearness.fill(0.0);
+        frame.nearest.fill(u32::MAX);
         frame.cones.clear();
         for (id, corners) in triangles {
             if let Some(cone) = Cone::new(id, &corners) {
                 let index = frame.cones.len() as u32;
-                for column in cone.columns(&corners, self.columns()) {
+                for column in cone.columns(&corners, self.columns()).filter(|&column| wanted[column]) {
                     self.draw_column(frame, index, &cone, column);
                 }
                 frame.cones.push(cone);
@@ -238,7 +256,7 @@ mod tests {
         ) {
             let grid = PanoramaGrid::new(90, 1, -1.0, 2.0);
             let mut frame = grid.frame();
-            grid.draw(&mut frame, scene.iter().enumerate().map(|(id, corners)| (id as u32, *corners)));
+            grid.draw(&mut frame, scene.iter().enumerate().map(|(id, corners)| (id as u32, *corners)), &[true; 90]);
             let mut wrong = 0;
             for column in 0..grid.columns() {
                 for row in 0..grid.rows() {
