@@ -7,7 +7,6 @@
 use super::Scene;
 use crate::mesh::Surface;
 use nalgebra::Vector3;
-use resurvey_schema::ClassId;
 
 /// Rows in a word of a bit plane.
 pub const ROWS_PER_WORD: usize = 64;
