@@ -5,9 +5,10 @@ use super::asset::Asset;
 use super::feature::{self, Kind, Row, Table};
 use super::frame::{Extent, GLTF_FROM_MAP};
 use super::material::Materials;
-use super::shape::{Shape, shape_of_descriptor, shapes_of_object};
+use super::shape::{DRAWN_OFF_M, Shape, shape_of_descriptor, shapes_of_object};
 use crate::crs::{CrsError, LocalOrigin};
 use crate::mesh::Surface;
+use crate::version::descriptor_to_file;
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Extras, Index, Material, Mesh, Node, Scene};
@@ -76,7 +77,7 @@ fn document(scene: &ExportScene) -> Result<Asset, ExportError> {
         parts.push(Part::new(fid, object.name.clone(), extras, Kind::Object, shapes)?);
     }
     for &(fid, descriptor) in &scene.descriptors {
-        let (kind, extras) = describe(fid, descriptor, scene);
+        let (kind, extras) = describe(fid, descriptor, scene)?;
         let name = format!("{} {fid}", scene.classes.name(descriptor.class()));
         let shapes = vec![(Look::Class(descriptor.class()), shape_of_descriptor(descriptor))];
         parts.push(Part::new(fid, name, extras, kind, shapes)?);
@@ -104,30 +105,19 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Extras of a descriptor: ids and the fields of its JSON form.
-fn describe(fid: u64, descriptor: &Descriptor, scene: &ExportScene) -> (Kind, Value) {
-    let class = scene.classes.name(descriptor.class());
-    let (kind, mut extras) = match descriptor {
-        Descriptor::Material(material) => (
-            Kind::Material,
-            json!({ "fid": fid, "kind": Kind::Material.name(), "class": class,
-                "corners": material.corners, "centre": material.centre(), "normal": material.normal }),
-        ),
-        Descriptor::Dynamic(dynamic) => (
-            Kind::Dynamic,
-            json!({ "fid": fid, "kind": Kind::Dynamic.name(), "class": class,
-                "position": dynamic.position, "size_m": dynamic.size_m }),
-        ),
+/// Extras of a descriptor: ids and its JSON form.
+fn describe(fid: u64, descriptor: &Descriptor, scene: &ExportScene) -> Result<(Kind, Value), ExportError> {
+    let kind = match descriptor {
+        Descriptor::Material(_) => Kind::Material,
+        Descriptor::Dynamic(_) => Kind::Dynamic,
     };
-    if let Descriptor::Dynamic(dynamic) = descriptor
-        && let Some(yaw_rad) = dynamic.yaw_rad
-    {
-        extras["yaw_deg"] = json!(yaw_rad.to_degrees());
+    let mut extras = serde_json::to_value(descriptor_to_file(descriptor, scene.classes))?;
+    extras["fid"] = json!(fid);
+    extras["kind"] = json!(kind.name());
+    if kind == Kind::Material {
+        extras["drawn_off_m"] = json!(DRAWN_OFF_M);
     }
-    if let Some(sigma) = descriptor.sigma() {
-        extras["sigma_m"] = json!(sigma.position_m);
-    }
-    (kind, extras)
+    Ok((kind, extras))
 }
 
 struct Writer<'a, 'b> {

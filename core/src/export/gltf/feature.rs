@@ -23,7 +23,7 @@ pub(super) struct Row {
 }
 
 /// What a feature is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Object,
     Material,

@@ -79,10 +79,23 @@ fn compact(mesh: &Mesh, origin: &LocalOrigin, triangles: &[[u32; 3]], textured: 
 pub(super) fn shape_of_descriptor(descriptor: &Descriptor) -> Shape {
     match descriptor {
         Descriptor::Material(material) => {
-            Shape { vertices: material.corners.to_vec(), uvs: Vec::new(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
+            let drawn = material.corners.map(|corner| lifted(corner, &material.normal));
+            Shape { vertices: drawn.to_vec(), uvs: Vec::new(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
         }
         Descriptor::Dynamic(dynamic) => shape_of_box(dynamic),
     }
+}
+
+/// How far a rectangle is drawn in front of its corners, metres: they lie on the wall, and a viewer shows two surfaces in
+/// one place as a flicker of both. The corners themselves stand in the extras.
+pub(super) const DRAWN_OFF_M: f64 = 0.02;
+
+fn lifted(corner: GridPoint, normal: &[f64; 3]) -> GridPoint {
+    GridPoint::new(
+        corner.easting_m + DRAWN_OFF_M * normal[0],
+        corner.northing_m + DRAWN_OFF_M * normal[1],
+        corner.height_m + DRAWN_OFF_M * normal[2],
+    )
 }
 
 /// Eight corners, twelve triangles that face outwards. Without a heading the box stands along the grid.
