@@ -5,7 +5,7 @@ use crate::args::{Import, UpAxis};
 use crate::console::Console;
 use crate::failure::Failure;
 use jiff::Timestamp;
-use resurvey_core::crs::Crs;
+use resurvey_core::crs::{Crs, LocalOrigin};
 use resurvey_core::image::LabelReading;
 use resurvey_core::mesh::{ClassMap, ImportOptions, Imported, Object, Up, encode_mesh, import_model};
 use resurvey_core::store::MapFile;
@@ -96,11 +96,18 @@ fn import_options(options: &Import, classes: &ClassTable) -> Result<ImportOption
     })
 }
 
-/// Moves objects whose coordinates are those of `source` into the map's grid: each by its origin, and turned there by
-/// nothing, so an object keeps its shape.
+/// Moves objects whose coordinates are those of `source` into the map's grid, vertex by vertex: grids differ in scale and
+/// in where their north is.
 fn move_between(imported: &mut Imported, crs: Crs, source: Crs) -> Result<(), Failure> {
-    for object in &mut imported.objects {
-        object.mesh.origin = crs.grid_from_other(source, object.mesh.origin).map_err(Failure::input)?;
+    for Object { name, mesh } in &mut imported.objects {
+        let moved = |point| crs.grid_from_other(source, point);
+        let failed = |error| Failure::input(format!("object {name:?}: {error}"));
+        let GridPoint { easting_m, northing_m, height_m } = moved(mesh.origin).map_err(failed)?;
+        let origin = GridPoint::new(easting_m.round(), northing_m.round(), height_m.round());
+        let local = LocalOrigin::new(origin).map_err(failed)?;
+        let vertices = mesh.vertices.iter().map(|vertex| local.to_local(moved(mesh.point(*vertex))?));
+        mesh.vertices = vertices.collect::<Result<_, _>>().map_err(failed)?;
+        mesh.origin = origin;
     }
     Ok(())
 }

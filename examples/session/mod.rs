@@ -73,11 +73,16 @@ impl Session {
         Ok(Answer { code, text: String::from_utf8(out).context("output is UTF-8")? })
     }
 
-    /// Runs a command with `--json` that must succeed.
+    /// Runs a command with `--json` that must come to a result: exit code 0, or 22 for a pose that is not reliable.
     pub fn json(&self, command: &str, arguments: &[&str]) -> anyhow::Result<Value> {
         let arguments: Vec<&str> = arguments.iter().copied().chain(["--json"]).collect();
         let answer = self.run(command, &arguments)?;
-        ensure!(answer.code == 0, "resurvey {command} ended with exit code {}: {}", answer.code, answer.text);
+        ensure!(
+            matches!(answer.code, 0 | 22),
+            "resurvey {command} ended with exit code {}: {}",
+            answer.code,
+            answer.text
+        );
         serde_json::from_str(&answer.text).with_context(|| format!("reading the answer of resurvey {command}"))
     }
 
