@@ -53,12 +53,12 @@ pub enum Command {
     Apply(Apply),
     /// Write a version or region of the map to another format; changes nothing in the map
     Export(Export),
-    /// List and describe plugins; runs no plugin code
+    /// List and describe plugins; changes nothing
     #[command(subcommand)]
     Plugins(Plugins),
     /// Check everything that must hold in a map; changes nothing
     Fsck(Fsck),
-    /// Print the completion script of a shell
+    /// Print the completion script of a shell (never JSON)
     Completions(Completions),
     /// Write a manual page per command into a directory
     Man(Man),
@@ -166,7 +166,6 @@ pub struct Render {
     /// Map file
     pub map: PathBuf,
     /// capture.json: its camera, and its prior pose unless --pose is given
-    #[arg(required_unless_present = "pose")]
     pub capture: Option<PathBuf>,
     /// Pose to draw from: a JSON file with a "pose"; without a capture the camera is 960x720 with a 120° diagonal
     #[arg(long, value_name = "POSE.json")]
@@ -240,7 +239,7 @@ pub struct Query {
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, value_parser = numbers::<2>, requires = "radius", conflicts_with_all = ["bbox", "polygon"])]
     pub near: Option<[f64; 2]>,
     /// Radius of the circle, metres
-    #[arg(long, value_name = "M", requires = "near")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, requires = "near")]
     pub radius: Option<f64>,
     /// Version, tag, date or head
     #[arg(long, default_value = "head", value_name = "REV")]
@@ -318,13 +317,13 @@ pub struct Export {
 /// `plugins` subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Plugins {
-    /// List plugins by kind
+    /// List plugins by kind; runs no code of plugin files
     List {
         /// Also say which directories were searched and why a file was skipped
         #[arg(long, short)]
         verbose: bool,
     },
-    /// Describe a plugin and its settings
+    /// Describe a plugin and its settings; loads an allowed plugin file
     Info {
         /// Name, as list prints it
         name: String,

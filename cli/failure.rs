@@ -1,4 +1,4 @@
-//! Errors with their exit code: 2 usage, 10 input file, 11 no such thing, 12 plugin, 13 map file, 21 conflict.
+//! Errors with their exit code: 2 usage, 10 input or output file, 11 no such thing, 12 plugin, 13 map file, 21 conflict.
 
 use resurvey_core::capture::CaptureError;
 use resurvey_core::crs::CrsError;
@@ -11,12 +11,13 @@ use resurvey_core::store::{CommitError, StoreError};
 use resurvey_core::update::UpdateError;
 use resurvey_core::version::{ChangeSetError, InvalidBox};
 use std::fmt;
+use std::path::Path;
 
 /// A bug in this program.
 pub const INTERNAL: u8 = 1;
 /// The command line.
 pub const USAGE: u8 = 2;
-/// A file that was given.
+/// A file that was given to read or to write.
 pub const INPUT: u8 = 10;
 /// A map, revision, feature or plugin that is not there.
 pub const MISSING: u8 = 11;
@@ -26,7 +27,7 @@ pub const PLUGIN: u8 = 12;
 pub const MAP: u8 = 13;
 /// Not an error: nothing to update.
 pub const NOTHING: u8 = 20;
-/// The map changed since the base version.
+/// The map changed since the base version, or another process is writing to it.
 pub const CONFLICT: u8 = 21;
 /// Not an error: the pose is not reliable.
 pub const UNRELIABLE: u8 = 22;
@@ -54,6 +55,12 @@ impl Failure {
         Self { code: INPUT, error: anyhow::anyhow!("{text}") }
     }
 
+    /// The same, naming `file` where the message does not.
+    pub fn about(self, file: &Path) -> Self {
+        let place = file.display().to_string();
+        if self.to_string().contains(&place) { self } else { Self { error: self.error.context(place), ..self } }
+    }
+
     /// The exit code.
     pub fn code(&self) -> u8 {
         self.code
@@ -68,7 +75,14 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{:#}", self.error)
+        // Causes that a message quotes already are not said twice.
+        let mut said = self.error.to_string();
+        for cause in self.error.chain().skip(1).map(ToString::to_string) {
+            if !said.contains(&cause) {
+                said += &format!(": {cause}");
+            }
+        }
+        formatter.write_str(&said)
     }
 }
 
@@ -83,7 +97,6 @@ macro_rules! failure_from {
 }
 
 failure_from! {
-    std::io::Error => INTERNAL,
     serde_json::Error => INTERNAL,
     CaptureError => INPUT,
     CrsError => USAGE,
@@ -98,10 +111,25 @@ failure_from! {
     InvalidBox => USAGE,
 }
 
+/// Results are the only thing written without the name of a file.
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self { code: INPUT, error: anyhow::Error::from(error).context("standard output") }
+    }
+}
+
 impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {
         let code = match &error {
-            StoreError::NotAMap { .. } | StoreError::NewerFormat { .. } | StoreError::Damaged { .. } => MAP,
+            StoreError::NotAMap { .. }
+            | StoreError::NewerFormat { .. }
+            | StoreError::Damaged { .. }
+            | StoreError::NoSuchGeometry { .. }
+            | StoreError::ReadOnly { .. }
+            | StoreError::NoWriteAheadLog { .. }
+            | StoreError::Full { .. } => MAP,
+            StoreError::Busy { .. } => CONFLICT,
+            StoreError::Internal { .. } => INTERNAL,
             StoreError::NotFound { .. }
             | StoreError::NoSuchVersion { .. }
             | StoreError::NoSuchFeature { .. }
@@ -118,7 +146,10 @@ impl From<StoreError> for Failure {
 impl From<CommitError> for Failure {
     fn from(error: CommitError) -> Self {
         match error {
-            CommitError::Conflict { .. } => Self::new(CONFLICT, error),
+            CommitError::Conflict { .. } => {
+                let next = "look at the features with \"resurvey query\" and work the change out again";
+                Self { code: CONFLICT, error: anyhow::anyhow!("{error}; {next}") }
+            }
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
         }

@@ -13,7 +13,7 @@ use args::{Cli, Command};
 use clap::Parser;
 use commands::{apply, evidence, export, fsck, generate, import, init, localize, log, plugins, query, render, update};
 use console::Console;
-use failure::{Failure, INTERNAL, USAGE};
+use failure::{Failure, USAGE};
 use std::ffi::OsString;
 use std::io::Write;
 
@@ -37,11 +37,19 @@ where
         Err(error) => return explain(&error, out, err),
     };
     let mut console = Console::new(out, err, cli.json, shows_progress);
-    match dispatch(&cli, &mut console) {
+    let result = dispatch(&cli, &mut console).and_then(|code| Ok(console.out().flush().map(|()| code)?));
+    exit_code(result, err)
+}
+
+/// The code of a result; says on standard error why it is none.
+fn exit_code(result: Result<u8, Failure>, err: &mut dyn Write) -> u8 {
+    match result {
         Ok(code) => code,
+        // The reader has what it wanted.
         Err(failure) if failure.is_closed_pipe() => 0,
         Err(failure) => {
-            console.message(&format!("resurvey: {failure}"));
+            // A closed standard error is nobody's loss.
+            let _ = writeln!(err, "resurvey: {failure}");
             failure.code()
         }
     }
@@ -50,12 +58,12 @@ where
 /// Prints help to standard output, a usage error to standard error.
 fn explain(error: &clap::Error, out: &mut dyn Write, err: &mut dyn Write) -> u8 {
     let text = error.render();
-    let written = if error.use_stderr() { write!(err, "{text}") } else { write!(out, "{text}") };
-    match (written, error.use_stderr()) {
-        (_, true) => USAGE,
-        (Ok(()), false) => 0,
-        (Err(_), false) => INTERNAL,
+    if error.use_stderr() {
+        let _ = write!(err, "{text}");
+        return USAGE;
     }
+    let written = write!(out, "{text}").and_then(|()| out.flush());
+    exit_code(written.map(|()| 0).map_err(Failure::from), err)
 }
 
 fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {

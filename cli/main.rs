@@ -1,7 +1,7 @@
 //! The `resurvey` binary.
 #![forbid(unsafe_code)]
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -9,7 +9,5 @@ fn main() -> ExitCode {
     let mut err = std::io::stderr();
     let shows_progress = err.is_terminal();
     let code = resurvey::run_with_progress(std::env::args_os(), &mut out, &mut err, shows_progress);
-    // A reader that closed the pipe has what it wanted.
-    let _ = out.flush();
     ExitCode::from(code)
 }

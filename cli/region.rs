@@ -87,9 +87,18 @@ impl Shape {
         };
         let mut lines = Vec::new();
         for ring in rings {
+            // RFC 7946, 3.1.6.
+            if ring.len() < 4 || ring.first() != ring.last() {
+                let found = ring.len();
+                let expected = "expected rings of four positions or more of which the last is the first";
+                return Err(Failure::input(format!("{place}: {expected}, found {found} positions")));
+            }
             let coordinates = ring.iter().map(|position| match position.as_slice() {
                 [x, y, ..] if is_wgs84 => {
-                    grid_point(crs, *y, *x).map(|point| Coord { x: point.easting_m, y: point.northing_m })
+                    let point = grid_point(crs, *y, *x).map_err(|error| {
+                        Failure::input(format!("{place}: {error}; positions are longitude, latitude"))
+                    });
+                    point.map(|point| Coord { x: point.easting_m, y: point.northing_m })
                 }
                 [x, y, ..] => Ok(Coord { x: *x, y: *y }),
                 other => {
@@ -99,7 +108,9 @@ impl Shape {
             lines.push(LineString(coordinates.collect::<Result<Vec<_>, _>>()?));
         }
         let outer = lines.remove(0);
-        Ok(Self::Polygon(Polygon::new(outer, lines)))
+        let polygon = Self::Polygon(Polygon::new(outer, lines));
+        around(&polygon.outline(), [0.0, 0.0]).map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        Ok(polygon)
     }
 
     /// Points around it in plan.

@@ -4,9 +4,9 @@ use crate::args::{PluginSearch, Settings};
 use crate::failure::Failure;
 use anyhow::anyhow;
 use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
-use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginInfo, Registry};
+use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginError, PluginInfo, Registry};
 use resurvey_core::version::PluginUse;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Colon-separated directories of plugin libraries.
 const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
@@ -40,6 +40,21 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         registry.add_directory(&directory);
     }
     Ok(registry)
+}
+
+/// The plugin called `name`. Where there is none, a library file of that name that was refused is why.
+pub fn load(registry: &Registry, name: &str) -> Result<Plugin, Failure> {
+    registry.load(name).map_err(|error| {
+        let is_named = |path: &Path| {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().replace('_', "-");
+            stem.strip_prefix("lib").unwrap_or(&stem) == name
+        };
+        let refused = registry.skipped().iter().find(|skipped| is_named(&skipped.path));
+        match (&error, refused) {
+            (PluginError::Unknown { .. }, Some(skipped)) => Failure::from(PluginError::from(skipped.refusal.clone())),
+            _ => error.into(),
+        }
+    })
 }
 
 /// Where this user's plugins are kept.
@@ -88,6 +103,13 @@ impl Choices {
 
     fn set_gate(&mut self, assignment: &Assignment) -> Result<(), Failure> {
         let value = number(assignment)?;
+        let (largest, expected) = match assignment.key.as_str() {
+            "min_score" | "max_runner_up_ratio" => (1.0, "0 to 1"),
+            _ => (f64::MAX, "0 or more"),
+        };
+        if !(0.0..=largest).contains(&value) && GATE_KEYS.contains(&assignment.key.as_str()) {
+            return Err(Failure::usage(format!("gate.{}={value}: expected {expected}", assignment.key)));
+        }
         if self.gate.set(&assignment.key, value) {
             return Ok(());
         }

@@ -13,6 +13,9 @@ use resurvey_core::version::{BoxMm, FeatureState, UpdateTransaction, VersionKind
 use resurvey_schema::{ClassTable, GridPoint};
 use serde_json::json;
 
+/// Distance of black from white, √3 · 255, rounded up.
+const FARTHEST_COLOUR: f64 = 442.0;
+
 /// Adds the objects of all files as one version.
 pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
@@ -28,12 +31,12 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     let mut reports = Vec::new();
     let stage = console.stage("import");
     for file in &options.files {
-        let mut imported = import_model(file, &how, snapshot.classes())?;
+        let mut imported = import_model(file, &how, snapshot.classes()).map_err(|error| Failure::from(error).about(file))?;
         if let Some(source) = &options.crs {
             move_between(&mut imported, crs, source.parse()?)?;
         }
         for object in &imported.objects {
-            add_object(&mut transaction, object)?;
+            add_object(&mut transaction, object).map_err(|failure| failure.about(file))?;
         }
         reports.push((file.display().to_string(), imported.report));
     }
@@ -77,7 +80,7 @@ fn import_options(options: &Import, classes: &ClassTable) -> Result<ImportOption
         ClassMap::parse(&text, classes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
     });
     if let Some(distance) = options.nearest_colour
-        && !(distance.is_finite() && distance >= 0.0)
+        && !(0.0..=FARTHEST_COLOUR).contains(&distance)
     {
         return Err(Failure::usage(format!("--nearest-colour {distance}: expected 0 to 441")));
     }

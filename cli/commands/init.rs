@@ -5,7 +5,7 @@ use crate::console::Console;
 use crate::failure::{Failure, USAGE};
 use jiff::Timestamp;
 use resurvey_core::crs::Crs;
-use resurvey_core::store::{MapFile, NewMap};
+use resurvey_core::store::{MapFile, NewMap, StoreError};
 use resurvey_core::version::Frame;
 use resurvey_schema::{Class, ClassTable};
 use serde_json::json;
@@ -28,7 +28,10 @@ pub fn run(options: &Init, console: &mut Console<'_>) -> Result<u8, Failure> {
         author: "resurvey".to_owned(),
         message: "init".to_owned(),
     };
-    let map = MapFile::create(&options.map, &new, Timestamp::now())?;
+    let map = MapFile::create(&options.map, &new, Timestamp::now()).map_err(|error| match &options.classes {
+        Some(classes) if matches!(error, StoreError::ClassTable { .. }) => Failure::from(error).about(classes),
+        _ => error.into(),
+    })?;
     if console.is_json() {
         let frame = map.info()?.frame;
         console.document(&json!({

@@ -5,7 +5,7 @@ use crate::args::{Localize, PluginSearch};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, UNRELIABLE};
-use crate::tools::{Choices, registry};
+use crate::tools::{Choices, load, registry};
 use resurvey_core::capture::{Capture, read_pose};
 use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
 use resurvey_core::store::MapFile;
@@ -17,7 +17,7 @@ use std::path::Path;
 /// Finds the pose of a capture. Exit code 0 when it is reliable, 22 when it is not.
 pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     let registry = registry(plugins)?;
-    let plugin = registry.load(&options.matcher)?;
+    let plugin = load(&registry, &options.matcher)?;
     let choices = Choices::read(&options.settings, &[&options.matcher])?;
     let tool = choices.tool(&plugin)?;
     let mut matcher = tool.plugin.matcher(&tool.settings)?;

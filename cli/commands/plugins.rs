@@ -4,7 +4,7 @@ use crate::args::{PluginSearch, Plugins};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
-use crate::tools::registry;
+use crate::tools::{load, registry};
 use comfy_table::{Table, presets};
 use resurvey_core::plugin::Registry;
 use serde_json::json;
@@ -57,7 +57,7 @@ fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Res
 }
 
 fn info(registry: &Registry, name: &str, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let plugin = registry.load(name)?;
+    let plugin = load(registry, name)?;
     let info = plugin.info();
     let settings = plugin.schema().iter();
     if console.is_json() {

@@ -165,9 +165,9 @@ impl Answer<'_> {
 
     fn csv(&self, console: &mut Console<'_>) -> Result<(), Failure> {
         let [x, y, h] = if self.is_wgs84 {
-            ["longitude", "latitude", "ellipsoidal_height_m"]
+            ["longitude", "latitude", "ellipsoidal_height"]
         } else {
-            ["easting_m", "northing_m", "height_m"]
+            ["easting", "northing", "height"]
         };
         console.line(format_args!("fid,kind,class,name,{x},{y},{h},width_m,height_m,area_m2,sigma_m,from,to"))?;
         for feature in self.features {

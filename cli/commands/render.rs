@@ -20,13 +20,16 @@ const DEPTH_STEP_M: f64 = 0.01;
 
 /// Draws the map from a pose.
 pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
+    if options.capture.is_none() && options.pose.is_none() {
+        return Err(Failure::usage("expected a capture.json, or --pose with a pose to draw from"));
+    }
     let map = MapFile::open_read_only(&options.map)?;
     let snapshot = map.snapshot(map.resolve(&options.at)?)?;
     let crs = crs_of(&map)?;
     let capture = options.capture.as_deref().map(|path| Capture::read(path, snapshot.classes(), crs)).transpose()?;
     let given = options.pose.as_deref().map(read_pose).transpose()?;
     let pose = given.or(capture.as_ref().map(|capture| capture.prior.pose));
-    let pose = pose.ok_or_else(|| Failure::usage("expected a capture or --pose"))?;
+    let pose = pose.expect("one of both is given: checked above");
     let camera = match capture {
         Some(capture) => capture.camera,
         None => paper_camera()?,

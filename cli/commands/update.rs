@@ -6,17 +6,17 @@ use crate::commands::localize::pose_text;
 use crate::console::{Console, Stage};
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
-use crate::tools::{Choices, Tool, registry};
+use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, read_pose};
 use resurvey_core::crs::Crs;
-use resurvey_core::localize::{Located, SceneServices, World, localize};
+use resurvey_core::localize::{GateLimits, Located, SceneServices, World, localize};
 use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
-use resurvey_core::render::view;
+use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::MapFile;
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve, world_around};
 use resurvey_core::version::{
-    BoxMm, Decision, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,
+    BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,
 };
 use resurvey_schema::{Localization, Pose};
 use serde_json::{Map, Value, json};
@@ -29,20 +29,29 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
     let given = options.pose.as_deref().map(read_pose).transpose()?;
     let mut documents = Vec::new();
-    let mut code = NOTHING;
+    let mut code = Ok(NOTHING);
     for path in &options.captures {
         let mut run = Run { map: &map, crs: crs_of(&map)?, options, timings: Map::new() };
-        let (document, of_capture) = run.capture(path, given, &mut tools, console)?;
-        code = if documents.is_empty() || code != 0 { of_capture } else { code };
-        documents.push(document);
+        match run.capture(path, given, &mut tools, console) {
+            Ok((document, of_capture)) => {
+                code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
+                documents.push(document);
+            }
+            Err(failure) => {
+                code = Err(failure);
+                break;
+            }
+        }
     }
-    if console.is_json() {
+    // What the captures before a bad one came to is in the map, so it is said.
+    let is_told = code.is_ok() || !documents.is_empty();
+    if console.is_json() && is_told {
         match documents.as_slice() {
-            [only] => console.document(only)?,
+            [only] if options.captures.len() == 1 => console.document(only)?,
             several => console.document(&several)?,
         }
     }
-    Ok(code)
+    code
 }
 
 /// The three plugins of one run.
@@ -59,7 +68,7 @@ impl Tools {
         let registry = registry(plugins)?;
         let names = [options.matcher.as_str(), options.detector.as_str(), options.estimator.as_str()];
         let choices = Choices::read(&options.settings, &names)?;
-        let load = |name: &str| -> Result<Tool, Failure> { choices.tool(&registry.load(name)?) };
+        let load = |name: &str| -> Result<Tool, Failure> { choices.tool(&tools::load(&registry, name)?) };
         let [matcher, detector, estimator] = [load(names[0])?, load(names[1])?, load(names[2])?];
         Ok(Self {
             matcher: matcher.plugin.matcher(&matcher.settings)?,
@@ -121,7 +130,7 @@ impl Run<'_> {
         console: &mut Console<'_>,
     ) -> Result<Located, Failure> {
         if let Some(pose) = given {
-            return Ok(Located::new(exactly(pose), &tools.choices.gate));
+            return Ok(given_pose(world, pose, &tools.choices.gate));
         }
         let stage = console.stage("localize");
         let services = SceneServices::new(world, capture, self.crs, &stage);
@@ -269,6 +278,23 @@ struct Committed {
     decision: Decision,
     version: Option<VersionId>,
     fids: Vec<u64>,
+}
+
+/// A pose that was given passes the gates, except inside a building: what it sees from there is no street.
+fn given_pose(world: &World, pose: Pose, limits: &GateLimits) -> Located {
+    let mut located = Located::new(exactly(pose), limits);
+    let is_inside = inside_solid(world.scene(true), pose.position);
+    located.gates.push(Gate {
+        name: "inside-building".to_owned(),
+        measured: f64::from(u8::from(is_inside)),
+        limit: 0.0,
+        unit: "count".to_owned(),
+        passed: !is_inside,
+    });
+    if is_inside {
+        located.reasons.push("the pose that was given lies inside a building of the map".to_owned());
+    }
+    located
 }
 
 /// A pose that was given is taken at its word.

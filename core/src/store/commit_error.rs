@@ -8,7 +8,7 @@ use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId};
 #[non_exhaustive]
 pub enum CommitError {
     /// The map changed since the base version, or is not what the transaction takes it to be.
-    #[error("the map changed between version {base} and version {head}: {}", list(changed))]
+    #[error("{}: {}", since(*base, *head), list(changed))]
     Conflict {
         /// The version the transaction was worked out against.
         base: VersionId,
@@ -101,6 +101,13 @@ pub struct ConflictingChange {
     pub found: Option<FeatureState>,
     /// Whether the transaction changes it; else it only lies in the viewed region.
     pub is_target: bool,
+}
+
+fn since(base: VersionId, head: VersionId) -> String {
+    if base == head {
+        return format!("version {head} of the map is not what was expected");
+    }
+    format!("the map changed between version {base} and version {head}")
 }
 
 fn list(changed: &[ConflictingChange]) -> String {

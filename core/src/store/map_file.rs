@@ -65,7 +65,7 @@ impl MapFile {
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
                 return Err(StoreError::Exists { path: path.to_owned() });
             }
-            Err(error) => return Err(io_error(path, &error)),
+            Err(error) => return Err(StoreError::Io { path: path.to_owned(), detail: error.to_string() }),
         }
         let made = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
             .map_err(|fault| fault.at(path))

@@ -1,0 +1,19 @@
+//! The command line through its public door: what it refuses, with which words and exit code, and what it answers.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may fail loudly")]
+
+#[path = "../../examples/synthetic/mod.rs"]
+mod synthetic;
+
+mod answers;
+mod bench;
+mod captures;
+mod change_sets;
+mod exports;
+mod generated;
+mod history;
+mod map_files;
+mod models;
+mod page;
+mod plugin_files;
+mod updates;
+mod usage;
