@@ -23,7 +23,8 @@ pub fn man(options: &Man, console: &mut Console<'_>) -> Result<u8, Failure> {
     if console.is_json() {
         let entries = std::fs::read_dir(&options.out).and_then(|entries| entries.collect::<Result<Vec<_>, _>>());
         let names = entries.map_err(failed)?.into_iter().map(|entry| entry.file_name().to_string_lossy().into_owned());
-        let mut files: Vec<String> = names.filter(|name| name.starts_with("resurvey") && name.ends_with(".1")).collect();
+        let mut files: Vec<String> =
+            names.filter(|name| name.starts_with("resurvey") && name.ends_with(".1")).collect();
         files.sort_unstable();
         console.document(&json!({ "directory": options.out.display().to_string(), "files": files }))?;
     } else {

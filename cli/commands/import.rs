@@ -31,7 +31,8 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     let mut reports = Vec::new();
     let stage = console.stage("import");
     for file in &options.files {
-        let mut imported = import_model(file, &how, snapshot.classes()).map_err(|error| Failure::from(error).about(file))?;
+        let mut imported =
+            import_model(file, &how, snapshot.classes()).map_err(|error| Failure::from(error).about(file))?;
         if let Some(source) = &options.crs {
             move_between(&mut imported, crs, source.parse()?)?;
         }

@@ -29,7 +29,10 @@ fn features_are_printed_with_the_documented_keys() {
         let keys: Vec<&str> = feature.as_object().unwrap().keys().map(String::as_str).collect();
         assert_eq!(keys[..4], ["fid", "from", "to", "kind"]);
         if feature["fid"] == fid {
-            assert_eq!((&feature["from"], &feature["to"], &feature["kind"]), (&json!(2), &json!(null), &json!("material")));
+            assert_eq!(
+                (&feature["from"], &feature["to"], &feature["kind"]),
+                (&json!(2), &json!(null), &json!("material"))
+            );
             for key in ["class", "corners", "centre", "width_m", "height_m", "area_m2", "normal", "sigma_m"] {
                 assert!(keys.contains(&key), "{key} is not among {keys:?}");
             }
@@ -79,8 +82,15 @@ fn degrees_find_what_metres_find() {
 fn a_polygon_finds_what_lies_in_it_and_not_in_its_hole() {
     let (bench, document) = Bench::with_banner();
     let (fid, [e, n, _]) = banner(&document);
-    let ring = |reach: f64| json!([[e - reach, n - reach], [e + reach, n - reach], [e + reach, n + reach],
-        [e - reach, n + reach], [e - reach, n - reach]]);
+    let ring = |reach: f64| {
+        json!([
+            [e - reach, n - reach],
+            [e + reach, n - reach],
+            [e + reach, n + reach],
+            [e - reach, n + reach],
+            [e - reach, n - reach]
+        ])
+    };
     let polygon = |rings: Value| json!({"type": "Polygon", "coordinates": rings});
     let found = |document: Value, words: &[&str]| {
         let file = bench.file("region.geojson", document.to_string());
@@ -118,7 +128,8 @@ fn a_polygon_file_that_is_none_is_exit_10() {
         let file = bench.file("region.geojson", contents);
         bench.refuses("query", &["--polygon", &file], 10, &["region.geojson"]);
     }
-    let swapped = bench.file("region.geojson", r#"{"type":"Polygon","coordinates":[[[22,114],[23,114],[23,115],[22,114]]]}"#);
+    let swapped =
+        bench.file("region.geojson", r#"{"type":"Polygon","coordinates":[[[22,114],[23,114],[23,115],[22,114]]]}"#);
     bench.refuses("query", &["--polygon", &swapped, "--wgs84"], 10, &["region.geojson"]);
     bench.refuses("query", &["--polygon", "/nowhere.geojson"], 10, &["/nowhere.geojson"]);
 }
@@ -204,15 +215,27 @@ fn init_and_import_say_what_they_made() {
     let made = resurvey(&["init", text(&map), "--json"]).ok().json();
     let keys: Vec<&String> = made.as_object().unwrap().keys().collect();
     assert_eq!(keys, ["map", "map_id", "version", "crs", "vertical_datum"]);
-    assert_eq!((&made["version"], &made["crs"], &made["vertical_datum"]), (&json!(0), &json!("EPSG:2326"), &json!("hkpd")));
+    assert_eq!(
+        (&made["version"], &made["crs"], &made["vertical_datum"]),
+        (&json!(0), &json!("EPSG:2326"), &json!("hkpd"))
+    );
     for suffix in ["3ds", "glb"] {
         let model = street().model(suffix);
-        let imported = bench.json("import", &[text(&model), "--origin", &street().origin(), "--message", "survey 2026"]);
+        let imported =
+            bench.json("import", &[text(&model), "--origin", &street().origin(), "--message", "survey 2026"]);
         let file = &imported["files"][0];
         let keys: Vec<&String> = file.as_object().unwrap().keys().collect();
         let expected = [
-            "file", "format", "origin", "objects", "triangles", "textures", "degenerate_faces", "empty_objects",
-            "skipped_primitives", "warnings",
+            "file",
+            "format",
+            "origin",
+            "objects",
+            "triangles",
+            "textures",
+            "degenerate_faces",
+            "empty_objects",
+            "skipped_primitives",
+            "warnings",
         ];
         assert_eq!(keys, expected);
         assert!(file["objects"].as_u64().unwrap() > 1 && file["triangles"].as_u64().unwrap() > 100);

@@ -189,32 +189,65 @@ fn labels_without_meaning_change_nothing() {
     comes_to_nothing(&bench, &document().to_string(), &labels, Some(text(&street().path("pose.json"))));
 }
 
-#[test]
-fn a_pose_inside_a_building_or_underground_changes_nothing() {
-    let bench = Bench::with_street();
-    let labels = good_labels();
+/// A point inside the first tall building of the street, at eye height.
+fn inside_a_building() -> [f64; 3] {
     let block = street().scene.world.blocks.iter().find(|block| block.top - block.bottom > 10.0).unwrap();
     let corners = block.corners();
     let middle = [0, 1].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0);
-    let inside = street().scene.grid([middle[0], middle[1], block.bottom + 1.6]);
-    let mut below = street().case.truth.position;
-    below[2] -= 30.0;
-    let mut above = street().case.truth.position;
-    above[2] += 5000.0;
-    for [easting, northing, height] in [inside, below, above] {
-        let prior = edited(&document(), |d| {
-            let prior = d["prior"].as_object_mut().unwrap();
-            prior.shift_remove("latitude");
-            prior.shift_remove("longitude");
-            prior.insert("easting".to_owned(), json!(easting));
-            prior.insert("northing".to_owned(), json!(northing));
-            prior.insert("height".to_owned(), json!(height));
-        });
+    street().scene.grid([middle[0], middle[1], block.bottom + 1.6])
+}
+
+/// The true position, moved up by so many metres.
+fn raised(by_m: f64) -> [f64; 3] {
+    let [easting, northing, height] = street().case.truth.position;
+    [easting, northing, height + by_m]
+}
+
+/// A capture whose prior is at this grid position.
+fn with_prior([easting, northing, height]: [f64; 3]) -> String {
+    edited(&document(), |d| {
+        let prior = d["prior"].as_object_mut().unwrap();
+        prior.shift_remove("latitude");
+        prior.shift_remove("longitude");
+        prior.insert("easting".to_owned(), json!(easting));
+        prior.insert("northing".to_owned(), json!(northing));
+        prior.insert("height".to_owned(), json!(height));
+    })
+}
+
+#[test]
+fn a_pose_inside_a_building_underground_or_in_the_air_changes_nothing() {
+    let bench = Bench::with_street();
+    let labels = good_labels();
+    let pose_at = |[easting, northing, height]: [f64; 3]| {
         let yaw_deg = street().case.truth.attitude_deg[0];
         let pose = json!({"easting": easting, "northing": northing, "height": height, "yaw_deg": yaw_deg,
             "pitch_deg": 0.0, "roll_deg": 0.0});
-        let pose = bench.file("pose.json", pose.to_string());
-        comes_to_nothing(&bench, &prior, &labels, Some(&pose));
+        bench.file("pose.json", pose.to_string())
+    };
+    let document = document().to_string();
+    let inside = comes_to_nothing(&bench, &document, &labels, Some(&pose_at(inside_a_building())));
+    assert_eq!(inside.code, 22);
+    assert!(inside.out.contains("inside a building of the map"), "{}", inside.out);
+    for by_m in [-30.0, 500.0] {
+        comes_to_nothing(&bench, &document, &labels, Some(&pose_at(raised(by_m))));
+    }
+}
+
+#[test]
+fn a_prior_inside_a_building_or_underground_never_moves_the_banner() {
+    let truth = street().case.truth.changes[0].position.unwrap();
+    for position in [inside_a_building(), raised(-30.0)] {
+        let bench = Bench::with_street();
+        let path = capture(&bench, &with_prior(position), &good_labels());
+        let run = bench.run("update", &[&path, "--json"]);
+        assert!([0, 20, 22].contains(&run.code), "exit {}: {}", run.code, run.err);
+        for change in run.json()["changes"].as_array().unwrap() {
+            assert_eq!((&change["op"], &change["class"]), (&json!("add"), &json!("banner")));
+            let off = [0, 1].map(|axis| change["after"]["centre"][axis].as_f64().unwrap() - truth[axis]);
+            assert!(off[0].hypot(off[1]) < 0.6, "{change}");
+        }
+        assert_eq!(bench.head(), if run.code == 0 { 2 } else { 1 });
     }
 }
 

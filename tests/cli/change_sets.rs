@@ -64,7 +64,12 @@ fn a_before_that_is_not_what_the_map_has_is_exit_21() {
     let bench = furnished();
     let wrong = json!({"class": "chair", "position": [835_600.5, 817_800.0, 4.5]});
     let remove = json!({"op": "remove", "fid": 1, "before": wrong});
-    refuses(&bench, &set(Some(1), &[json!({"op": "add", "after": banner()}), remove]), 21, &["version 1 of the map is not what was expected: feature 1", "resurvey query"]);
+    refuses(
+        &bench,
+        &set(Some(1), &[json!({"op": "add", "after": banner()}), remove]),
+        21,
+        &["version 1 of the map is not what was expected: feature 1", "resurvey query"],
+    );
     refuses(&bench, &set(Some(1), &[json!({"op": "remove", "fid": 9, "before": chair()})]), 21, &["feature 9"]);
     let taken = json!({"op": "add", "fid": 1, "after": chair()});
     refuses(&bench, &set(None, &[taken]), 21, &["feature 1"]);

@@ -76,7 +76,11 @@ fn a_reader_that_goes_away_is_no_error() {
         drop(child.stdout.take());
         let mut messages = String::new();
         child.stderr.take().unwrap().read_to_string(&mut messages).unwrap();
-        assert_eq!((child.wait().unwrap().code(), messages.contains("pipe")), (Some(0), false), "{words:?}: {messages}");
+        assert_eq!(
+            (child.wait().unwrap().code(), messages.contains("pipe")),
+            (Some(0), false),
+            "{words:?}: {messages}"
+        );
     }
 }
 

@@ -20,8 +20,18 @@ fn the_log_is_newest_first_and_can_be_narrowed_to_a_feature_or_a_region() {
     assert_eq!(numbers(&log), [2, 1, 0]);
     let keys: Vec<&String> = log["versions"][0].as_object().unwrap().keys().collect();
     let expected = [
-        "version", "kind", "committed_at", "observed_at", "author", "message", "base_version", "reverts", "added",
-        "modified", "removed", "hash",
+        "version",
+        "kind",
+        "committed_at",
+        "observed_at",
+        "author",
+        "message",
+        "base_version",
+        "reverts",
+        "added",
+        "modified",
+        "removed",
+        "hash",
     ];
     assert_eq!(keys, expected);
     let kinds: Vec<_> = log["versions"].as_array().unwrap().iter().map(|one| one["kind"].as_str().unwrap()).collect();
@@ -80,7 +90,7 @@ fn why_names_the_capture_the_plugins_and_the_gates() {
         assert_eq!(info["sha256"], digest);
     }
     let gates = seen["gates"].as_array().unwrap();
-    assert!(gates.iter().all(|gate| gate["passed"] == true) && gates.len() == 4, "{gates:?}");
+    assert!(gates.iter().all(|gate| gate["passed"] == true) && gates.len() == 5, "{gates:?}");
     let lines = bench.run("why", &[&fid]).ok().out;
     for word in ["version 2: add", digest, "prior", "pose", "gate", "detector", "estimator"] {
         assert!(lines.contains(word), "{word:?} is not in {lines}");
@@ -100,7 +110,8 @@ fn why_of_an_imported_object_says_that_there_is_no_capture() {
 #[test]
 fn labels_are_kept_as_evidence_only_when_asked() {
     let bench = Bench::with_street();
-    let (capture, pose) = (crate::bench::street().path("capture/capture.json"), crate::bench::street().path("pose.json"));
+    let (capture, pose) =
+        (crate::bench::street().path("capture/capture.json"), crate::bench::street().path("pose.json"));
     let words = [text(&capture), "--pose", text(&pose), "--keep-labels", "--message", "survey", "--author", "ada"];
     let document = bench.json("update", &words);
     let why = bench.json("why", &[&document["changes"][0]["fid"].to_string()]);

@@ -53,7 +53,10 @@ fn a_file_that_is_no_map_is_exit_13_and_stays_as_it_is() {
     bench.file("text.rsv", "a map, honestly");
     bench.file("empty.rsv", "");
     bench.file("random.rsv", noise(8192));
-    Connection::open(bench.path("other.rsv")).unwrap().execute_batch("CREATE TABLE t (x); PRAGMA user_version = 1").unwrap();
+    Connection::open(bench.path("other.rsv"))
+        .unwrap()
+        .execute_batch("CREATE TABLE t (x); PRAGMA user_version = 1")
+        .unwrap();
     fs::create_dir(bench.path("directory.rsv")).unwrap();
     for (name, word) in [
         ("text.rsv", "another kind of file"),

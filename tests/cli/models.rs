@@ -119,7 +119,9 @@ fn a_label_texture_with_a_colour_that_is_no_class_names_the_texel() {
     let texture = texture.filter(|path| path.extension().is_some_and(|suffix| suffix == "PNG")).min().unwrap();
     let model = folder.join("street.3ds");
     let words = [text(&model), "--origin", &street().origin()];
-    for contents in [colour_png([1, 2, 3]), noise(500), Vec::new(), label_png::encode(&[0; 16], 4).unwrap()[..60].to_vec()] {
+    for contents in
+        [colour_png([1, 2, 3]), noise(500), Vec::new(), label_png::encode(&[0; 16], 4).unwrap()[..60].to_vec()]
+    {
         std::fs::write(&texture, contents).unwrap();
         bench.refuses("import", &words, 10, &[texture.file_name().unwrap().to_str().unwrap()]);
     }
@@ -148,12 +150,12 @@ fn a_new_map_never_replaces_a_file_and_its_class_table_must_be_one() {
     init(&["--classes", "/nowhere.json"]).refused(10, &["/nowhere.json"]);
     for (contents, word) in [
         ("[]", "class"),
-        ("{", "EOF"),
+        ("[{", "EOF"),
         (r#"[{"index":0,"name":"stone","colour":[0,0,255],"kind":"rock"}]"#, "rock"),
         (
             r#"[{"index":0,"name":"a","colour":[0,0,255],"kind":"material"},
                 {"index":0,"name":"b","colour":[0,0,254],"kind":"material"}]"#,
-            "0",
+            "share an index",
         ),
     ] {
         let classes = bench.file("classes.json", contents);

@@ -29,8 +29,12 @@ fn plugin(bench: &Bench, source: &str, name: &str, flags: &[&str]) -> Option<Str
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     restrict(&directory, 0o755);
     restrict(&library, 0o644);
-    let digest = sha2::Sha256::digest(std::fs::read(&library).unwrap());
-    Some(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+    Some(hex(&std::fs::read(&library).unwrap()))
+}
+
+/// SHA-256 in hexadecimal digits.
+fn hex(bytes: &[u8]) -> String {
+    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn restrict(path: &Path, mode: u32) {
@@ -46,8 +50,7 @@ fn restrict(path: &Path, mode: u32) {
 /// Asserts that `update` with the matcher called `name` ends with code 12 and changes nothing.
 fn refuses_update(bench: &Bench, name: &str, sha256: &str, words: &[&str]) {
     let (capture, directory) = (street().path("capture/capture.json"), bench.path("plugins"));
-    let arguments =
-        [text(&capture), "--matcher", name, "--plugin-dir", text(&directory), "--allow-plugin", sha256];
+    let arguments = [text(&capture), "--matcher", name, "--plugin-dir", text(&directory), "--allow-plugin", sha256];
     bench.refuses("update", &arguments, 12, words);
     bench.refuses("localize", &arguments, 12, words);
 }
@@ -87,6 +90,41 @@ fn a_plugin_that_fails_or_lies_stops_the_update() {
 }
 
 #[test]
+fn a_plugin_that_panics_is_exit_12_and_the_program_lives_on() {
+    for mode in ["panic-in-create", "panic-in-score", "not-a-number"] {
+        let bench = Bench::with_street();
+        let directory = bench.path("plugins");
+        std::fs::create_dir_all(&directory).unwrap();
+        let built = format!("{}resurvey_fixtures{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        let bytes = std::fs::read(std::env::current_exe().unwrap().with_file_name(&built)).unwrap();
+        let library = directory.join(built);
+        std::fs::write(&library, &bytes).unwrap();
+        restrict(&directory, 0o755);
+        restrict(&library, 0o644);
+        let (capture, sha256) = (street().path("capture/capture.json"), hex(&bytes));
+        let setting = format!("fixture.mode={mode}");
+        let arguments = [
+            text(&capture),
+            "--matcher",
+            "fixture",
+            "--set",
+            &setting,
+            "--set",
+            "search.radius_m=2",
+            "--plugin-dir",
+            text(&directory),
+            "--allow-plugin",
+            &sha256,
+        ];
+        let word = if mode == "not-a-number" { "NaN" } else { "panicked in" };
+        for command in ["localize", "update"] {
+            bench.refuses(command, &arguments, 12, &["plugin fixture", word]);
+        }
+        assert_eq!(bench.head(), 1);
+    }
+}
+
+#[test]
 fn listing_says_where_it_looked_and_why_a_file_is_skipped() {
     let bench = Bench::with_street();
     let Some(sha256) = plugin(&bench, "matcher.c", "agreement", &[]) else { return };
@@ -111,8 +149,18 @@ fn an_allowed_plugin_localizes_and_is_named_in_the_result() {
     let Some(sha256) = plugin(&bench, "matcher.c", "agreement", &[]) else { return };
     let (capture, directory) = (street().path("capture/capture.json"), bench.path("plugins"));
     let arguments = [
-        text(&capture), "--matcher", "agreement", "--plugin-dir", text(&directory), "--allow-plugin", &sha256,
-        "--set", "search.radius_m=3", "--set", "search.yaw_range_deg=2", "--json",
+        text(&capture),
+        "--matcher",
+        "agreement",
+        "--plugin-dir",
+        text(&directory),
+        "--allow-plugin",
+        &sha256,
+        "--set",
+        "search.radius_m=3",
+        "--set",
+        "search.yaw_range_deg=2",
+        "--json",
     ];
     let run = bench.run("localize", &arguments);
     assert!([0, 22].contains(&run.code), "{}", run.err);

@@ -14,12 +14,28 @@ fn pose() -> PathBuf {
 
 /// The keys of a JSON object, in its order.
 fn keys(value: &Value) -> Vec<&str> {
-    value.as_object().unwrap_or_else(|| panic!("expected an object, found {value}")).keys().map(String::as_str).collect()
+    value
+        .as_object()
+        .unwrap_or_else(|| panic!("expected an object, found {value}"))
+        .keys()
+        .map(String::as_str)
+        .collect()
 }
 
 const LOCALIZATION: [&str; 13] = [
-    "pose", "latitude", "longitude", "score", "covariance", "reliable", "reasons", "gates", "runner_up", "candidates",
-    "skipped", "matcher", "timings_ms",
+    "pose",
+    "latitude",
+    "longitude",
+    "score",
+    "covariance",
+    "reliable",
+    "reasons",
+    "gates",
+    "runner_up",
+    "candidates",
+    "skipped",
+    "matcher",
+    "timings_ms",
 ];
 
 #[test]
@@ -28,7 +44,14 @@ fn an_update_at_the_true_pose_places_the_banner_with_the_documented_keys() {
     assert_eq!(
         keys(&document),
         [
-            "capture", "base_version", "version", "decision", "localization", "changes", "rejections", "plugins",
+            "capture",
+            "base_version",
+            "version",
+            "decision",
+            "localization",
+            "changes",
+            "rejections",
+            "plugins",
             "timings_ms"
         ]
     );
@@ -144,7 +167,8 @@ fn a_view_is_drawn_in_the_size_of_the_camera() {
     let document = bench.json("render", &[text(&capture), "--pose", text(&pose), "--out", text(&out)]);
     assert_eq!(keys(&document), ["version", "pose", "width", "height", "class", "depth", "points"]);
     let size = |name: &str| {
-        let reader = png::Decoder::new(std::io::Cursor::new(std::fs::read(out.join(name)).unwrap())).read_info().unwrap();
+        let reader =
+            png::Decoder::new(std::io::Cursor::new(std::fs::read(out.join(name)).unwrap())).read_info().unwrap();
         (u64::from(reader.info().width), u64::from(reader.info().height), reader.info().bit_depth)
     };
     let expected = (document["width"].as_u64().unwrap(), document["height"].as_u64().unwrap());
