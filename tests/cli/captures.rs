@@ -152,7 +152,7 @@ fn a_prior_away_from_the_map_says_where_it_is() {
 /// Updates with this capture: nothing may come of it but exit code 20 or 22.
 fn comes_to_nothing(bench: &Bench, document: &str, labels: &[u8], pose: Option<&str>) -> Run {
     let path = capture(bench, document, labels);
-    let given = pose.map_or_else(Vec::new, |pose| vec!["--pose", pose]);
+    let given = pose.map_or_else(|| vec!["--set", "semantic.radius_m=10"], |pose| vec!["--pose", pose]);
     let run = bench.run("update", &[&[path.as_str(), "--json"], given.as_slice()].concat());
     assert!([20, 22].contains(&run.code), "exit {}: {}{}", run.code, run.out, run.err);
     assert_eq!((&run.json()["changes"], &run.json()["version"]), (&json!([]), &Value::Null));
@@ -189,12 +189,19 @@ fn labels_without_meaning_change_nothing() {
     comes_to_nothing(&bench, &document().to_string(), &labels, Some(text(&street().path("pose.json"))));
 }
 
-/// A point inside the first tall building of the street, at eye height.
+/// A point at eye height in the building that is nearest to the camera, so that the search from there still reaches it.
 fn inside_a_building() -> [f64; 3] {
-    let block = street().scene.world.blocks.iter().find(|block| block.top - block.bottom > 10.0).unwrap();
-    let corners = block.corners();
-    let middle = [0, 1].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0);
-    street().scene.grid([middle[0], middle[1], block.bottom + 1.6])
+    let camera = street().case.truth.position;
+    let tall = street().scene.world.blocks.iter().filter(|block| block.top - block.bottom > 10.0);
+    let middles = tall.map(|block| {
+        let corners = block.corners();
+        let middle = [0, 1].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0);
+        street().scene.grid([middle[0], middle[1], block.bottom + 1.6])
+    });
+    let distance_m = |point: &[f64; 3]| (point[0] - camera[0]).hypot(point[1] - camera[1]);
+    let nearest = middles.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b))).unwrap();
+    assert!(distance_m(&nearest) < 30.0);
+    nearest
 }
 
 /// The true position, moved up by so many metres.

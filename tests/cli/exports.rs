@@ -78,10 +78,13 @@ fn an_empty_map_exports_to_a_file_that_is_valid() {
     assert_eq!(run.code == 0, out.exists());
 }
 
+/// A search of a moment, whatever it finds.
+const QUICK: &str = "semantic.radius_m=2";
+
 #[test]
 fn no_output_option_overwrites_a_map() {
     let bench = Bench::with_street();
     let (map, capture) = (bench.path("map.rsv"), crate::bench::street().path("capture/capture.json"));
-    bench.refuses("localize", &[text(&capture), "--out", text(&map)], 10, &["map.rsv", "a map"]);
-    bench.refuses("localize", &[text(&capture), "--heatmap", text(&map)], 10, &["map.rsv", "a map"]);
+    bench.refuses("localize", &[text(&capture), "--set", QUICK, "--out", text(&map)], 10, &["map.rsv", "a map"]);
+    bench.refuses("localize", &[text(&capture), "--set", QUICK, "--heatmap", text(&map)], 10, &["map.rsv", "a map"]);
 }

@@ -17,7 +17,10 @@ fn subcommands(words: &[&str]) -> Vec<String> {
 /// Long options in the help of `words`.
 fn options(words: &[&str]) -> Vec<String> {
     let help = resurvey(&[words, &["--help"]].concat()).ok().out;
-    let starts = help.lines().map(str::trim_start).filter(|line| line.starts_with("--") || line.starts_with("-n,") || line.starts_with("-v,"));
+    let starts = help
+        .lines()
+        .map(str::trim_start)
+        .filter(|line| line.starts_with("--") || line.starts_with("-n,") || line.starts_with("-v,"));
     let long = starts
         .filter_map(|line| line.split(|c: char| c.is_whitespace() || c == ',').find(|word| word.starts_with("--")));
     long.map(|word| word.trim_end_matches(|c: char| !c.is_alphanumeric()).to_owned()).collect()
@@ -80,7 +83,7 @@ fn the_page_names_every_key_of_every_document() {
         bench.json("log", &[]),
         bench.json("why", &[&fid]),
         bench.json("fsck", &[]),
-        bench.json("localize", &[text(&capture)]),
+        bench.run("localize", &[text(&capture), "--set", "semantic.radius_m=2", "--json"]).json(),
         bench.json("render", &["--pose", text(&pose), "--out", text(&view)]),
         bench.json("export", &[text(&out)]),
         bench.json("import", &[text(&out)]),

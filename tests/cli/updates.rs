@@ -140,14 +140,16 @@ fn a_pose_that_is_found_can_be_written_and_read_again() {
     bench.run("render", &["--pose", text(&found), "--out", text(&out)]).ok();
     assert!(out.join("view.json").exists());
     let nowhere = bench.path("no/such/pose.json");
-    bench.run("localize", &[text(&capture), "--out", text(&nowhere)]).refused(10, &["no/such/pose.json"]);
+    bench
+        .run("localize", &[text(&capture), "--set", "semantic.radius_m=2", "--out", text(&nowhere)])
+        .refused(10, &["no/such/pose.json"]);
 }
 
 #[test]
 fn an_unreliable_pose_is_exit_22_with_its_reasons_and_commits_nothing() {
     let bench = Bench::with_street();
     let capture = capture();
-    let strict = [text(&capture), "--set", "gate.min_score=1", "--json"];
+    let strict = [text(&capture), "--set", "gate.min_score=1", "--set", "semantic.radius_m=5", "--json"];
     let localized = bench.run("localize", &strict);
     assert_eq!(localized.code, 22, "{}", localized.err);
     assert_eq!(localized.json()["reliable"], false);
