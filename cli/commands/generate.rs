@@ -21,7 +21,7 @@ pub fn man(options: &Man, console: &mut Console<'_>) -> Result<u8, Failure> {
     std::fs::create_dir_all(&options.out).map_err(failed)?;
     clap_mangen::generate_to(Cli::command(), &options.out).map_err(failed)?;
     if console.is_json() {
-        let entries = std::fs::read_dir(&options.out).and_then(|entries| entries.collect::<Result<Vec<_>, _>>());
+        let entries = std::fs::read_dir(&options.out).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let names = entries.map_err(failed)?.into_iter().map(|entry| entry.file_name().to_string_lossy().into_owned());
         let mut files: Vec<String> =
             names.filter(|name| name.starts_with("resurvey") && name.ends_with(".1")).collect();

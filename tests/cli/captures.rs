@@ -44,11 +44,14 @@ fn a_capture_that_is_not_there_or_no_json_is_named() {
     bench.refuses("update", &[&random], 10, &["capture.json: "]);
 }
 
+/// What is wrong with a capture.
+type Edit = fn(&mut Value);
+
 #[test]
 fn unknown_keys_and_impossible_values_are_refused_by_name() {
     let bench = Bench::with_street();
     let labels = good_labels();
-    let cases: &[(fn(&mut Value), &[&str])] = &[
+    let cases: &[(Edit, &[&str])] = &[
         (|d| d["format"] = json!("resurvey.capture/2"), &["resurvey.capture/2", "expected \"resurvey.capture/1\""]),
         (|d| d["weather"] = json!("fine"), &["unknown field `weather`"]),
         (|d| d["camera"]["iso"] = json!(100), &["unknown field `iso`"]),
