@@ -16,6 +16,7 @@ pub mod export;
 pub mod host;
 pub mod image;
 pub mod kinds;
+pub mod score;
 pub mod toy;
 
 pub use host::Host;

@@ -2,7 +2,7 @@
 
 use crate::settings::{ClassWeights, Settings};
 use resurvey_plugin::schema::{ClassKind, ClassTable};
-use resurvey_plugin::{ClassCounts, ClassSet};
+use resurvey_plugin::{ClassCounts, ClassSet, score};
 
 /// Which classes are left out of the comparison because the map cannot know them.
 pub struct Compared {
@@ -64,18 +64,15 @@ impl Likeness {
         for count in counts {
             equal += u64::from(count.both);
             all += u64::from(count.photo);
-            let union = f64::from(count.photo) + f64::from(count.view) - f64::from(count.both);
-            if union <= 0.0 {
-                continue;
-            }
+            let Some(dice) = score::dice(count) else { continue };
             let weight = match self.class_weights {
                 ClassWeights::Area => f64::from(count.photo),
                 ClassWeights::Equal => 1.0,
             };
-            let jaccard = f64::from(count.both) / union;
-            let dice = 2.0 * jaccard / (1.0 + jaccard);
-            let boundary = if boundary_f1 > 0.0 { boundary_f1 * f1(count) } else { 0.0 };
-            per_class += weight * (self.dice * dice + self.jaccard * jaccard + boundary);
+            let jaccard = score::jaccard(count).unwrap_or(0.0);
+            // A class without a boundary in either image fills both: they agree.
+            let boundary = if boundary_f1 > 0.0 { score::boundary_f1(count).unwrap_or(1.0) } else { 0.0 };
+            per_class += weight * (self.dice * dice + self.jaccard * jaccard + boundary_f1 * boundary);
             weight_sum += weight;
         }
         if weight_sum <= 0.0 || all == 0 {
@@ -87,17 +84,6 @@ impl Likeness {
         }
         (per_class / weight_sum + self.agreement * equal as f64 / all as f64) / weights
     }
-}
-
-/// Boundary F1 (Csurka et al., BMVC 2013) of a class that is in at least one of the images.
-fn f1(count: &ClassCounts) -> f64 {
-    let share = |part: u32, whole: u32| if whole == 0 { 0.0 } else { f64::from(part) / f64::from(whole) };
-    if count.photo_boundary == 0 && count.view_boundary == 0 {
-        return 1.0;
-    }
-    let precision = share(count.view_boundary_matched, count.view_boundary);
-    let recall = share(count.photo_boundary_matched, count.photo_boundary);
-    if precision + recall > 0.0 { 2.0 * precision * recall / (precision + recall) } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Dice, Jaccard and boundary F1 of one class, from its counts. `None` where the class is in neither image.
+//! Dice, Jaccard and boundary F1 of one class, from the counts that the host's comparisons return (Lee & Hsu, Eq. 5).
+//! `None` where the class is in neither image.
 
 use resurvey_schema::service::ClassCounts;
 
