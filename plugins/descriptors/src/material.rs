@@ -2,15 +2,18 @@
 //! Alg. 1 as a measured value beside its limit.
 
 use crate::edges::is_true_edge;
+use crate::fit::{self, EdgePoint, Fit, Sides};
 use crate::outline::Outline;
 use crate::plane::Plane;
-use crate::quad::{self, CORRELATION_PX, Quad};
+use crate::quad::{self, Quad};
 use crate::rectangle::{self, Corners};
 use crate::requirement::{Stop, Unmet, at_least, at_most};
+use crate::settings::Settings;
+use crate::shape::{self, NOISE_SIGMAS};
 use crate::sight::Sight;
 use crate::spread::{Nudge, nudges, pose_sigmas};
 use crate::window::{Window, rays};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3, Vector5};
 use resurvey_plugin::schema::{ChangeRegion, ClassKind, MaterialDescriptor, Uncertainty};
 
 /// Points to which a plane is fitted, at most.
@@ -23,8 +26,10 @@ const MIN_INNER: f64 = 0.5;
 const FILL_SAMPLES: f64 = 5000.0;
 /// Share of the contour that may be hidden and still count as seen whole: label noise does that much.
 const HIDDEN_NOISE: f64 = 0.1;
-/// Requirements on shape widen with what label noise alone would cause, at most to this multiple.
-const MAX_WIDENING: f64 = 2.0;
+/// Smallest 1σ of labels' contours, pixels: labels have whole pixels.
+const MIN_JITTER_PX: f64 = 0.3;
+/// Share of the contour beyond each side of the box from which the fit starts.
+const AROUND: f64 = 0.1;
 
 /// What one region is measured with.
 struct Measurement<'a> {
@@ -32,16 +37,16 @@ struct Measurement<'a> {
     region: &'a ChangeRegion,
     outline: &'a Outline,
     window: Window,
-    quad: Quad,
+    /// Four free sides, where they can be told.
+    quad: Option<Quad>,
     plane: Plane,
+    fit: Fit,
+    corners: Corners,
 }
 
-/// 1σ of what is measured, from label noise alone (`shape`) and with the pose.
+/// Variance of what is measured.
 #[derive(Default)]
 struct Variance {
-    side_difference: f64,
-    angle_deg: f64,
-    tilt_rad: f64,
     centre_m2: f64,
     size_m2: f64,
     area_m4: f64,
@@ -60,18 +65,52 @@ pub fn measure(sight: &Sight<'_>, region: &ChangeRegion, outline: &Outline) -> R
     if !sight.settings.allow_partly_hidden {
         at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
     }
-    let Some(quad) = quad::fit(&edge) else {
+    let quad = quad::fit(&edge);
+    if quad.is_none() {
         at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
-        return Err(shapeless.into());
-    };
-    let seen = quad.visible.iter().copied().fold(1.0, f64::min);
+    }
+    let plane = wall(sight, outline)?;
+    let free = quad.as_ref().and_then(|quad| corners(&window, &plane, &quad.corners, &Nudge::none()));
+    let fit = fitted(sight.settings, &plane, &on_plane(&window, &plane, &edge), free.as_ref()).ok_or(shapeless)?;
+    let seen = fit.visible.iter().copied().fold(1.0, f64::min);
     let min_seen = sight.settings.min_side_visible;
     if hidden_share > HIDDEN_NOISE {
         at_most("captured-entirely", 1.0 - seen, 1.0 - min_seen, "ratio")?;
     }
     at_least("rectangle", seen, min_seen, "ratio")?;
-    let plane = wall(sight, outline)?;
-    Measurement { sight, region, outline, window, quad, plane }.descriptor()
+    let corners = free.filter(|_| !sight.settings.regularise).unwrap_or_else(|| fit.sides.corners());
+    Measurement { sight, region, outline, window, quad, plane, fit, corners }.descriptor()
+}
+
+/// Contour points in the window as points on the plane; those that miss it are left out.
+fn on_plane(window: &Window, plane: &Plane, edge: &[Vector2<f64>]) -> Vec<EdgePoint> {
+    let at =
+        |pixel: Vector2<f64>| plane.meet(&Vector3::zeros(), &window.ray(&pixel)).map(|point| plane.coordinates(&point));
+    let point = |pixel: &Vector2<f64>| {
+        let step = |by: Vector2<f64>| Some(at(pixel + by / 2.0)? - at(pixel - by / 2.0)?);
+        let metres_per_px = Matrix2::from_columns(&[step(Vector2::x())?, step(Vector2::y())?]);
+        Some(EdgePoint { at: at(*pixel)?, metres_per_px })
+    };
+    edge.iter().filter_map(point).collect()
+}
+
+/// The rectangle that `points` show. Banners hang level: what is within the tolerance of level, and of what label noise
+/// does, is.
+fn fitted(settings: &Settings, plane: &Plane, points: &[EdgePoint], free: Option<&Corners>) -> Option<Fit> {
+    let jitter_px = settings.label_jitter_px.max(MIN_JITTER_PX);
+    let mut starts: Vec<Sides> = Sides::around(points, AROUND).into_iter().collect();
+    starts.extend(free.map(|corners| Sides::through(corners, 0.0)));
+    let turned = free.map(|corners| Sides::through(corners, rectangle::tilt_rad(corners)));
+    let any: Vec<Sides> = starts.iter().copied().chain(turned).collect();
+    let fit = fit::best(points, &any, jitter_px, false)?;
+    let tolerance_rad = settings.max_level_angle_deg.to_radians();
+    let noise_rad = NOISE_SIGMAS * fit.covariance[(4, 4)].sqrt();
+    let is_level = fit.sides.tilt_rad.abs() <= (tolerance_rad + noise_rad).min(2.0 * tolerance_rad);
+    if !(plane.is_upright() && is_level) {
+        return Some(fit);
+    }
+    starts.push(Sides::through(&fit.sides.corners(), 0.0));
+    fit::best(points, &starts, jitter_px, true)
 }
 
 /// True edges of the contour in the window, and the share of the contour that is none.
@@ -139,27 +178,18 @@ impl Measurement<'_> {
         let settings = self.sight.settings;
         let at_infinity =
             Unmet { requirement: "within-range", measured: f64::MAX, limit: settings.max_range_m, unit: "m" };
-        let corners = self.corners(&self.quad.corners, &Nudge::none()).ok_or(at_infinity)?;
-        let range_m = corners.iter().map(|corner| self.plane.at(corner).norm()).fold(0.0, f64::max);
+        let range_m = self.corners.iter().map(|corner| self.plane.at(corner).norm()).fold(0.0, f64::max);
         at_most("within-range", range_m, settings.max_range_m, "m")?;
-        let mut variance = Variance::default();
-        self.shake_sides(&corners, &mut variance);
-        self.is_rectangle(&corners, &variance)?;
-        self.fills()?;
-        for nudge in
-            nudges(&self.sight.comparison.estimate).ok_or(uncertain(f64::MAX, settings.max_position_sigma_m))?
-        {
-            variance.add(&corners, self.corners(&self.quad.corners, &nudge).as_ref());
+        let pixels = self.pixels().ok_or(at_infinity)?;
+        at_most("rectangle", self.fit.misfit, settings.max_misfit, "ratio")?;
+        self.fills(&pixels)?;
+        if let Some(quad) = &self.quad {
+            shape::is_rectangle(quad, settings, |pixels| corners(&self.window, &self.plane, pixels, &Nudge::none()))?;
         }
-        let corners = self.meant(&corners, &variance);
-        let sigma = Uncertainty {
-            position_m: variance.centre_m2.sqrt(),
-            size_m: Some(variance.size_m2.sqrt()),
-            area_m2: Some(variance.area_m4.sqrt()),
-        };
-        let points = corners.map(|corner| self.plane.at(&corner));
+        let sigma = self.sigma(&pixels)?;
+        let points = self.corners.map(|corner| self.plane.at(&corner));
         at_most("uncertain", sigma.position_m, settings.max_position_sigma_m, "m")?;
-        let area_share = variance.area_m4.sqrt() / rectangle::quad_area_m2(points);
+        let area_share = sigma.area_m2.unwrap_or(f64::INFINITY) / rectangle::quad_area_m2(points);
         at_most("uncertain", area_share, settings.max_area_sigma_share, "ratio")?;
         Ok(MaterialDescriptor {
             class: self.region.class_after,
@@ -169,43 +199,30 @@ impl Measurement<'_> {
         })
     }
 
-    /// Corners on the wall of `pixels` in the window, seen from a moved pose.
-    fn corners(&self, pixels: &[Vector2<f64>; 4], nudge: &Nudge) -> Option<Corners> {
-        let corner = |pixel: &Vector2<f64>| {
-            let point = self.plane.meet(&nudge.offset, &(nudge.turn * self.window.ray(pixel)))?;
-            Some(self.plane.coordinates(&point))
-        };
-        let [a, b, c, d] = pixels;
-        Some(rectangle::in_order([corner(a)?, corner(b)?, corner(c)?, corner(d)?]))
+    /// The corners in the window.
+    fn pixels(&self) -> Option<Corners> {
+        let pixel = |corner: &Vector2<f64>| self.window.pixel(&self.plane.at(corner));
+        let [a, b, c, d] = &self.corners;
+        Some([pixel(a)?, pixel(b)?, pixel(c)?, pixel(d)?])
     }
 
-    /// Adds what wandering contours do: a side of the length over which they wander together is off by 1σ of the
-    /// labels' jitter, a longer one by less.
-    fn shake_sides(&self, corners: &Corners, variance: &mut Variance) {
-        for side in 0..4 {
-            let length_px = self.quad.length_px(side);
-            let independent = (length_px / CORRELATION_PX).max(1.0).sqrt();
-            let sigma_px = self.quad.sides[side].rms_px.max(self.sight.settings.label_jitter_px) / independent;
-            let turn_rad = 12f64.sqrt() * sigma_px / length_px.max(1.0);
-            for (shift_px, turn_rad) in [(sigma_px, 0.0), (0.0, turn_rad)] {
-                let shaken = self.quad.shaken(side, shift_px, turn_rad);
-                variance.add(corners, shaken.and_then(|pixels| self.corners(&pixels, &Nudge::none())).as_ref());
-            }
+    /// 1σ by the labels' jitter and the pose together.
+    fn sigma(&self, pixels: &Corners) -> Result<Uncertainty, Unmet> {
+        let mut variance = Variance::of_fit(&self.fit);
+        let no_pose = uncertain(f64::MAX, self.sight.settings.max_position_sigma_m);
+        for nudge in nudges(&self.sight.comparison.estimate).ok_or(no_pose)? {
+            variance.add(&self.corners, corners(&self.window, &self.plane, pixels, &nudge).as_ref());
         }
+        Ok(Uncertainty {
+            position_m: variance.centre_m2.sqrt(),
+            size_m: Some(variance.size_m2.sqrt()),
+            area_m2: Some(variance.area_m4.sqrt()),
+        })
     }
 
-    fn is_rectangle(&self, corners: &Corners, variance: &Variance) -> Result<(), Unmet> {
-        let settings = self.sight.settings;
-        let widened = |limit: f64, variance: f64| (limit + variance.sqrt()).min(MAX_WIDENING * limit);
-        let limit = widened(settings.max_side_difference, variance.side_difference);
-        at_most("rectangle", rectangle::side_difference(corners), limit, "ratio")?;
-        let limit_deg = widened(settings.max_angle_difference_deg, variance.angle_deg);
-        at_most("rectangle", rectangle::angle_difference_deg(corners), limit_deg, "deg")
-    }
-
-    /// Requires that region and quadrilateral are nearly the same, what something nearer hides aside: pixels of both
+    /// Requires that region and rectangle are nearly the same, what something nearer hides aside: pixels of both
     /// over pixels of either, so that a round region is refused whatever square is laid on it.
-    fn fills(&self) -> Result<(), Stop> {
+    fn fills(&self, corners: &Corners) -> Result<(), Stop> {
         let bounds = self.outline.bounds;
         let margin = |size: u32| i64::from(size / 4 + 4);
         let across = i64::from(bounds.left) - margin(bounds.width())..i64::from(bounds.right) + margin(bounds.width());
@@ -220,7 +237,7 @@ impl Measurement<'_> {
         let centres: Vec<[f64; 2]> = pixels.iter().map(|pixel| pixel.map(|x| x as f64 + 0.5)).collect();
         let [mut filled, mut empty, mut hidden, mut beyond] = [0.0; 4];
         for ([u, v], ray) in pixels.iter().zip(rays(self.sight.host, self.sight.pose(), &centres)?) {
-            let in_quad = self.window.pixel(&ray).is_some_and(|pixel| self.quad.contains(&pixel));
+            let in_quad = self.window.pixel(&ray).is_some_and(|pixel| rectangle::contains(corners, &pixel));
             let photo = self.sight.photo(*u, *v);
             match (in_quad, self.outline.contains(*u, *v)) {
                 (true, true) => filled += 1.0,
@@ -243,20 +260,16 @@ impl Measurement<'_> {
         let in_front = photo.is_some_and(|class| self.sight.host.classes().kind(class) != ClassKind::Material);
         self.sight.settings.allow_partly_hidden && in_front && photo != view && photo != self.sight.sky
     }
+}
 
-    /// The rectangle that the quadrilateral is meant to be. Banners hang level: what is within the tolerance of level,
-    /// and of what label noise does, is.
-    fn meant(&self, corners: &Corners, variance: &Variance) -> Corners {
-        let settings = self.sight.settings;
-        if !settings.regularise {
-            return *corners;
-        }
-        let tilt_rad = rectangle::tilt_rad(corners);
-        let tolerance_rad = settings.max_level_angle_deg.to_radians();
-        let tolerance_rad = (tolerance_rad + variance.tilt_rad.sqrt()).min(MAX_WIDENING * tolerance_rad);
-        let is_level = self.plane.is_upright() && tilt_rad.abs() <= tolerance_rad;
-        rectangle::regular(corners, if is_level { 0.0 } else { tilt_rad })
-    }
+/// Corners on the wall of `pixels` in the window, seen from a moved pose.
+fn corners(window: &Window, plane: &Plane, pixels: &Corners, nudge: &Nudge) -> Option<Corners> {
+    let corner = |pixel: &Vector2<f64>| {
+        let point = plane.meet(&nudge.offset, &(nudge.turn * window.ray(pixel)))?;
+        Some(plane.coordinates(&point))
+    };
+    let [a, b, c, d] = pixels;
+    Some(rectangle::in_order([corner(a)?, corner(b)?, corner(c)?, corner(d)?]))
 }
 
 fn uncertain(measured: f64, limit: f64) -> Unmet {
@@ -264,6 +277,21 @@ fn uncertain(measured: f64, limit: f64) -> Unmet {
 }
 
 impl Variance {
+    fn of_fit(fit: &Fit) -> Self {
+        let [width_m, height_m] = fit.sides.size_m();
+        let of = |weights: [f64; 4]| {
+            let [a, b, c, d] = weights;
+            let weights = Vector5::new(a, b, c, d, 0.0);
+            weights.dot(&(fit.covariance * weights))
+        };
+        let (width_m2, height_m2) = (of([-1.0, 1.0, 0.0, 0.0]), of([0.0, 0.0, -1.0, 1.0]));
+        Self {
+            centre_m2: of([0.5, 0.5, 0.0, 0.0]) + of([0.0, 0.0, 0.5, 0.5]),
+            size_m2: width_m2.max(height_m2),
+            area_m4: of([-height_m, height_m, -width_m, width_m]),
+        }
+    }
+
     /// Adds the squares of what moving a corner changes; nothing left to measure is an infinite change.
     fn add(&mut self, corners: &Corners, moved: Option<&Corners>) {
         let Some(moved) = moved else {
@@ -271,12 +299,8 @@ impl Variance {
             self.area_m4 = f64::INFINITY;
             return;
         };
-        let change = |of: fn(&Corners) -> f64| (of(moved) - of(corners)).powi(2);
         let area = |corners: &Corners| (corners[2] - corners[0]).perp(&(corners[3] - corners[1])) / 2.0;
         let centre = |corners: &Corners| corners.iter().sum::<Vector2<f64>>() / 4.0;
-        self.side_difference += change(rectangle::side_difference);
-        self.angle_deg += change(rectangle::angle_difference_deg);
-        self.tilt_rad += change(rectangle::tilt_rad);
         self.centre_m2 += (centre(moved) - centre(corners)).norm_squared();
         let ([w, h], [moved_w, moved_h]) = (rectangle::size_m(corners), rectangle::size_m(moved));
         self.size_m2 += ((moved_w - w).powi(2)).max((moved_h - h).powi(2));

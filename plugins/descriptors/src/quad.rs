@@ -78,15 +78,6 @@ impl Quad {
         sides[side].along = along + across * turn_rad.tan();
         meet(&sides)
     }
-
-    /// Whether `point` lies inside.
-    pub fn contains(&self, point: &Vector2<f64>) -> bool {
-        let turns = [0, 1, 2, 3].map(|side| {
-            let (start, end) = (self.corners[side], self.corners[(side + 1) % 4]);
-            (end - start).perp(&(point - start)) >= 0.0
-        });
-        turns.iter().all(|left| *left) || turns.iter().all(|left| !left)
-    }
 }
 
 /// The points of each side: those nearest to it that lie beside its middle part.

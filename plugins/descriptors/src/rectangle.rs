@@ -1,6 +1,6 @@
 //! A quadrilateral on a plane: how near it is to a rectangle, its size, and the rectangle it is meant to be.
 
-use nalgebra::{Rotation2, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 /// Corners on a plane, bottom-left, bottom-right, top-right, top-left, metres.
 pub type Corners = [Vector2<f64>; 4];
@@ -57,14 +57,13 @@ pub fn tilt_rad(corners: &Corners) -> f64 {
     along.y.atan2(along.x)
 }
 
-/// The rectangle tilted by `tilt_rad` whose sides go through the middles of those of `corners`.
-pub fn regular(corners: &Corners, tilt_rad: f64) -> Corners {
-    let turn = Rotation2::new(-tilt_rad);
-    let [bl, br, tr, tl] = corners.map(|corner| turn * corner);
-    let (left, right) = ((bl.x + tl.x) / 2.0, (br.x + tr.x) / 2.0);
-    let (bottom, top) = ((bl.y + br.y) / 2.0, (tl.y + tr.y) / 2.0);
-    let back = turn.inverse();
-    [[left, bottom], [right, bottom], [right, top], [left, top]].map(|corner| back * Vector2::from(corner))
+/// Whether `point` lies in the convex quadrilateral `corners`.
+pub fn contains(corners: &Corners, point: &Vector2<f64>) -> bool {
+    let turns = [0, 1, 2, 3].map(|side| {
+        let (start, end) = (corners[side], corners[(side + 1) % 4]);
+        (end - start).perp(&(point - start)) >= 0.0
+    });
+    turns.iter().all(|left| *left) || turns.iter().all(|left| !left)
 }
 
 #[cfg(test)]
@@ -97,13 +96,5 @@ mod tests {
             let mirrored = [0, 1, 2, 3].map(|corner| want[(start + 4 - corner) % 4]);
             assert_eq!((in_order(turned), in_order(mirrored)), (want, want));
         }
-    }
-
-    #[test]
-    fn making_a_rectangle_of_a_rectangle_changes_nothing() {
-        let turn = Rotation2::new(0.3);
-        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]].map(|corner| turn * Vector2::from(corner));
-        let made = regular(&corners, tilt_rad(&corners));
-        assert!(made.iter().zip(&corners).all(|(a, b)| (a - b).norm() < 1e-12));
     }
 }
