@@ -1,6 +1,7 @@
 //! Dynamic descriptors: an object of predefined size where its foot meets the ground (Lee & Hsu, Eq. 16).
 
 use crate::contact::ground_contact;
+use crate::edges::shows_map_below;
 use crate::outline::Outline;
 use crate::requirement::{Stop, Unmet, at_most};
 use crate::sight::Sight;
@@ -13,6 +14,8 @@ use resurvey_plugin::schema::{ChangeRegion, DynamicDescriptor, Uncertainty};
 const FOOT_WIDTH: f64 = 0.5;
 /// Share of the foot's columns that end above the row taken: a ragged contour has low tips.
 const FOOT_ROW: f64 = 0.75;
+/// Largest share of the foot's columns that something else may hide.
+const MAX_FOOT_HIDDEN: f64 = 0.5;
 /// The foot that is seen is the near edge of the base. Its distance from the centre, over half a side of a square base,
 /// is 1 to √2, and 4/π·ln(1 + √2) on the mean over all headings.
 const NEAR_EDGE: f64 = 1.122;
@@ -113,7 +116,7 @@ fn split(
 
 /// The object that `outline` shows, taken to be one.
 fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found, Stop> {
-    let foot_px = foot_px(outline);
+    let foot_px = foot_px(sight, outline)?;
     let direction = rays(sight.host, sight.pose(), &[foot_px])?[0];
     let contact = ground_contact(sight, &direction)?;
     let ahead = Vector3::new(contact.x, contact.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
@@ -135,8 +138,9 @@ fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found,
     Ok(Found { contact, position, foot_px, size_ratio: [width_px / reach(0), height_px / reach(1)] })
 }
 
-/// Where the object meets the ground: the centroid's column, and the row where most columns about it end.
-fn foot_px(outline: &Outline) -> [f64; 2] {
+/// Where the object meets the ground: the centroid's column, and the row where most columns about it end. Of columns that
+/// end at something the map has not, which may stand in front, at most [`MAX_FOOT_HIDDEN`].
+fn foot_px(sight: &Sight<'_>, outline: &Outline) -> Result<[f64; 2], Unmet> {
     let (mut sum, mut count) = (0.0, 0.0);
     let mut ends = std::collections::BTreeMap::new();
     for [u, v] in outline.pixels() {
@@ -147,10 +151,14 @@ fn foot_px(outline: &Outline) -> [f64; 2] {
     let middle = sum / f64::max(count, 1.0);
     let reach = f64::from(outline.bounds.width()) * FOOT_WIDTH / 2.0;
     let near = |u: &u32| (f64::from(*u) + 0.5 - middle).abs() <= reach.max(1.0);
-    let mut rows: Vec<u32> = ends.iter().filter(|(u, _)| near(u)).map(|(_, end)| *end).collect();
+    let all = ends.iter().filter(|(u, _)| near(u));
+    let total = all.clone().count();
+    let mut rows: Vec<u32> = all.filter(|(u, end)| shows_map_below(sight, **u, **end)).map(|(_, end)| *end).collect();
+    let hidden = 1.0 - rows.len() as f64 / total.max(1) as f64;
+    at_most("captured-entirely", hidden, MAX_FOOT_HIDDEN, "ratio")?;
     rows.sort_unstable();
     let row = rows.get(((rows.len() as f64 * FOOT_ROW) as usize).min(rows.len().saturating_sub(1)));
-    [middle, f64::from(row.copied().unwrap_or(outline.bounds.bottom))]
+    Ok([middle, f64::from(row.copied().unwrap_or(outline.bounds.bottom))])
 }
 
 fn descriptor(

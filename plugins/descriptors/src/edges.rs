@@ -29,6 +29,16 @@ pub fn is_true_edge(sight: &Sight<'_>, outline: &Outline, point: &ContourPoint, 
     !PROBE_PX.into_iter().all(hidden)
 }
 
+/// Whether the photo shows what the map has below column `u` of something that ends at row `end`: not where something
+/// that the map has not may stand in front.
+pub fn shows_map_below(sight: &Sight<'_>, u: u32, end: u32) -> bool {
+    let shows = |step: i64| {
+        let (u, v) = (i64::from(u), i64::from(end) - 1 + step);
+        sight.photo(u, v).is_some_and(|photo| has_nearby(sight, u, v, photo))
+    };
+    PROBE_PX.into_iter().any(shows)
+}
+
 fn has_nearby(sight: &Sight<'_>, u: i64, v: i64, class: ClassId) -> bool {
     let steps = [-EXPLAIN_PX, -EXPLAIN_PX / 2, 0, EXPLAIN_PX / 2, EXPLAIN_PX];
     steps.into_iter().any(|down| steps.into_iter().any(|right| sight.view(u + right, v + down) == Some(class)))

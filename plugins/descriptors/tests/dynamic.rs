@@ -75,6 +75,18 @@ fn a_person_cut_by_the_border_is_refused() {
 }
 
 #[test]
+fn a_person_whose_feet_a_wrong_blob_hides_is_refused() {
+    // In the alley of the field captures such a person was placed 2.9 m too far away.
+    let mut labels = capture(&[object(PEDESTRIAN, at(0.0, 8.0, 0.0))]);
+    noise::ellipse(&mut labels, 960, ([480.0, 442.0], [26.0, 14.0], 0.0), GLASS);
+    let (_, proposals) = update(street(), labels, known(pose()));
+    assert!(placed(&proposals).is_empty(), "{proposals:?}");
+    let rejection = rejected(&proposals).into_iter().find(|rejection| rejection.class_after == PEDESTRIAN).unwrap();
+    assert_eq!(rejection.requirement, "captured-entirely");
+    assert!(rejection.measured > rejection.limit, "share of the feet hidden");
+}
+
+#[test]
 fn a_picture_of_a_person_on_the_wall_has_no_ground_contact() {
     let mut labels = photo(street(), &pose());
     for v in 100..200 {
