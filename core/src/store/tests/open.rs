@@ -125,5 +125,5 @@ fn a_map_that_cannot_be_made_leaves_no_file() {
     assert!(matches!(error, Some(StoreError::ClassTable { .. })), "{error:?}");
     assert!(!path.exists());
     let missing = directory.path().join("no/such/directory.rsv");
-    assert!(matches!(MapFile::create(&missing, &new_map(), at(0)), Err(StoreError::NotFound { .. })));
+    assert!(matches!(MapFile::create(&missing, &new_map(), at(0)), Err(StoreError::Io { .. })));
 }
