@@ -172,7 +172,7 @@ fn descriptor(
     let factor = found.size_ratio.iter().map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max);
     at_most("size", factor, settings.max_size_factor, "ratio")?;
     let position_m = position_sigma_m(sight, found)?;
-    at_most("uncertain", position_m, settings.max_position_sigma_m, "m")?;
+    at_most("uncertain", position_m, settings.max_dynamic_sigma_m, "m")?;
     Ok(DynamicDescriptor {
         class: region.class_after,
         position: sight.to_grid(&found.position),
@@ -197,7 +197,7 @@ fn position_sigma_m(sight: &Sight<'_>, found: &Found) -> Result<f64, Stop> {
         variance += (meet(Vector3::zeros(), *direction) - found.contact).norm_squared();
     }
     let not_finite =
-        Unmet { requirement: "uncertain", measured: f64::MAX, limit: sight.settings.max_position_sigma_m, unit: "m" };
+        Unmet { requirement: "uncertain", measured: f64::MAX, limit: sight.settings.max_dynamic_sigma_m, unit: "m" };
     for nudge in nudges(&sight.comparison.estimate).ok_or(not_finite)? {
         variance += (meet(nudge.offset, nudge.turn * seen[0]) - found.contact).norm_squared();
     }

@@ -3,7 +3,7 @@
 
 use crate::edges::is_true_edge;
 use crate::fit::{self, EdgePoint, Fit, Sides};
-use crate::outline::Outline;
+use crate::outline::{ContourPoint, Outline};
 use crate::plane::Plane;
 use crate::quad::{self, Quad};
 use crate::rectangle::{self, Corners};
@@ -37,6 +37,8 @@ struct Measurement<'a> {
     region: &'a ChangeRegion,
     outline: &'a Outline,
     window: Window,
+    /// True edges and the rest of the contour, in the window.
+    contour: [Vec<Vector2<f64>>; 2],
     /// Four free sides, where they can be told.
     quad: Option<Quad>,
     plane: Plane,
@@ -61,7 +63,8 @@ pub fn measure(sight: &Sight<'_>, region: &ChangeRegion, outline: &Outline) -> R
     let centre = Vector2::new(middle(bounds.left, bounds.right), middle(bounds.top, bounds.bottom));
     let shapeless = Unmet { requirement: "rectangle", measured: 0.0, limit: 4.0, unit: "sides" };
     let window = Window::new(sight.host, sight.pose(), centre)?.ok_or(shapeless)?;
-    let (edge, hidden_share) = contour(sight, region, outline, &window)?;
+    let [edge, hidden] = contour(sight, region, outline, &window)?;
+    let hidden_share = hidden.len() as f64 / (edge.len() + hidden.len()).max(1) as f64;
     if !sight.settings.allow_partly_hidden {
         at_most("captured-entirely", hidden_share, HIDDEN_NOISE, "ratio")?;
     }
@@ -78,8 +81,10 @@ pub fn measure(sight: &Sight<'_>, region: &ChangeRegion, outline: &Outline) -> R
         at_most("captured-entirely", 1.0 - seen, 1.0 - min_seen, "ratio")?;
     }
     at_least("rectangle", seen, min_seen, "ratio")?;
+    // Where much is hidden, four free sides tell little.
+    let quad = quad.filter(|_| hidden_share <= HIDDEN_NOISE);
     let corners = free.filter(|_| !sight.settings.regularise).unwrap_or_else(|| fit.sides.corners());
-    Measurement { sight, region, outline, window, quad, plane, fit, corners }.descriptor()
+    Measurement { sight, region, outline, window, contour: [edge, hidden], quad, plane, fit, corners }.descriptor()
 }
 
 /// Contour points in the window as points on the plane; those that miss it are left out.
@@ -113,22 +118,21 @@ fn fitted(settings: &Settings, plane: &Plane, points: &[EdgePoint], free: Option
     fit::best(points, &starts, jitter_px, true)
 }
 
-/// True edges of the contour in the window, and the share of the contour that is none.
+/// The contour in the window: true edges, and where something else ends the region.
 fn contour(
     sight: &Sight<'_>,
     region: &ChangeRegion,
     outline: &Outline,
     window: &Window,
-) -> Result<(Vec<Vector2<f64>>, f64), Stop> {
-    let contour = outline.contour();
-    let edge: Vec<[f64; 2]> = contour
-        .iter()
-        .filter(|point| is_true_edge(sight, outline, point, region.class_after))
-        .map(|point| point.at.into())
-        .collect();
-    let hidden_share = 1.0 - edge.len() as f64 / contour.len().max(1) as f64;
-    let rays = rays(sight.host, sight.pose(), &edge)?;
-    Ok((rays.iter().filter_map(|ray| window.pixel(ray)).collect(), hidden_share))
+) -> Result<[Vec<Vector2<f64>>; 2], Stop> {
+    let (edge, hidden): (Vec<_>, Vec<_>) =
+        outline.contour().into_iter().partition(|point| is_true_edge(sight, outline, point, region.class_after));
+    let seen = |points: Vec<ContourPoint>| {
+        let pixels: Vec<[f64; 2]> = points.iter().map(|point| point.at.into()).collect();
+        let rays = rays(sight.host, sight.pose(), &pixels)?;
+        Ok::<_, Stop>(rays.iter().filter_map(|ray| window.pixel(ray)).collect())
+    };
+    Ok([seen(edge)?, seen(hidden)?])
 }
 
 /// The plane of the surface behind the region, from points far enough inside that a pose error leaves them on it.
@@ -183,6 +187,8 @@ impl Measurement<'_> {
         let pixels = self.pixels().ok_or(at_infinity)?;
         at_most("rectangle", self.fit.misfit, settings.max_misfit, "ratio")?;
         self.fills(&pixels)?;
+        let [edge, hidden] = &self.contour;
+        shape::has_corners(&pixels, edge, hidden, settings)?;
         if let Some(quad) = &self.quad {
             shape::is_rectangle(quad, settings, |pixels| corners(&self.window, &self.plane, pixels, &Nudge::none()))?;
         }
@@ -220,8 +226,7 @@ impl Measurement<'_> {
         })
     }
 
-    /// Requires that region and rectangle are nearly the same, what something nearer hides aside: pixels of both
-    /// over pixels of either, so that a round region is refused whatever square is laid on it.
+    /// Requires that the region fills the rectangle, what something nearer hides aside, and has little beyond it.
     fn fills(&self, corners: &Corners) -> Result<(), Stop> {
         let bounds = self.outline.bounds;
         let margin = |size: u32| i64::from(size / 4 + 4);
@@ -251,7 +256,8 @@ impl Measurement<'_> {
         let settings = self.sight.settings;
         let share = |part: f64, rest: f64| part / f64::max(part + rest, 1.0);
         at_most("captured-entirely", share(hidden, filled + empty), 1.0 - settings.min_side_visible, "ratio")?;
-        at_least("rectangle", share(filled, empty + beyond), settings.min_fill, "ratio")?;
+        at_least("rectangle", share(filled, empty), settings.min_fill, "ratio")?;
+        at_least("rectangle", share(filled, beyond), settings.min_fill, "ratio")?;
         Ok(())
     }
 

@@ -14,7 +14,7 @@ const MIN_SCALE_PX: f64 = 0.5;
 /// Pieces into which a side is cut to see how much of it is visible.
 const PIECES: usize = 24;
 /// Length over which contours wander together, pixels: shorter pieces are not independent.
-pub const CORRELATION_PX: f64 = 24.0;
+pub const CORRELATION_PX: f64 = 28.0;
 
 /// A fitted side.
 #[derive(Clone, Copy, Debug)]

@@ -40,7 +40,7 @@ fn a_pose_error_moves_an_object_by_exactly_itself() {
         let mut wrong = pose();
         wrong.position.easting_m += error[0];
         wrong.position.northing_m += error[1];
-        let (_, proposals) = update(street(), labels.clone(), estimate(wrong, 0.5, 0.02));
+        let (_, proposals) = update(street(), labels.clone(), estimate(wrong, 0.3, 0.02));
         let moved = positions(&proposals)[0];
         assert!((moved.easting_m - before.easting_m - error[0]).abs() < 1e-6);
         assert!((moved.northing_m - before.northing_m - error[1]).abs() < 1e-6);
