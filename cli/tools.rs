@@ -169,7 +169,7 @@ impl Tool {
             kind: info.kind.to_string(),
             name: info.name.clone(),
             version: info.version.clone(),
-            sha256: Some(resurvey_core::version::Digest(info.sha256.bytes())),
+            sha256: Some(info.sha256),
             settings: serde_json::from_str(self.settings.as_json()).map_err(|error| {
                 Failure::new(crate::failure::INTERNAL, anyhow!("settings of {}: {error}", info.name))
             })?,

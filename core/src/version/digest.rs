@@ -1,4 +1,4 @@
-//! SHA-256 digests: the names of geometry, captures and versions.
+//! SHA-256 digests: the names of geometry, captures, versions and plugin files.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -11,7 +11,7 @@ pub struct Digest(pub [u8; 32]);
 
 /// A text that is not a digest.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("expected 64 hexadecimal digits, found {0:?}")]
+#[error("expected a SHA-256 of 64 hexadecimal digits, found {0:?}")]
 pub struct InvalidDigest(pub String);
 
 impl Digest {
