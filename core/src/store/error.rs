@@ -104,7 +104,7 @@ pub enum StoreError {
         fid: Fid,
     },
     /// A name nobody gave.
-    #[error("no tag {name:?}; \"resurvey tag\" gives names")]
+    #[error("no tag {name:?} in the map")]
     NoSuchTag {
         /// What was asked for.
         name: String,
