@@ -3,6 +3,7 @@
 use crate::contact::ground_contact;
 use crate::edges::shows_map_below;
 use crate::outline::Outline;
+use crate::quad::median;
 use crate::requirement::{Stop, Unmet, at_most};
 use crate::sight::Sight;
 use crate::spread::nudges;
@@ -15,7 +16,7 @@ const FOOT_WIDTH: f64 = 0.5;
 /// Share of the foot's columns that end above the row taken: a ragged contour has low tips.
 const FOOT_ROW: f64 = 0.75;
 /// Largest share of the foot's columns that something else may hide.
-const MAX_FOOT_HIDDEN: f64 = 0.5;
+const MAX_FOOT_HIDDEN: f64 = 0.7;
 /// The foot that is seen is the near edge of the base. Its distance from the centre, over half a side of a square base,
 /// is 1 to √2, and 4/π·ln(1 + √2) on the mean over all headings.
 const NEAR_EDGE: f64 = 1.122;
@@ -33,6 +34,8 @@ struct Found {
     contact: Vector3<f64>,
     position: Vector3<f64>,
     foot_px: [f64; 2],
+    /// Share of the foot that something hides.
+    foot_hidden: f64,
     /// Width and height over those of the predefined size.
     size_ratio: [f64; 2],
 }
@@ -116,7 +119,7 @@ fn split(
 
 /// The object that `outline` shows, taken to be one.
 fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found, Stop> {
-    let foot_px = foot_px(sight, outline)?;
+    let (foot_px, foot_hidden) = foot(sight, outline);
     let direction = rays(sight.host, sight.pose(), &[foot_px])?[0];
     let contact = ground_contact(sight, &direction)?;
     let ahead = Vector3::new(contact.x, contact.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
@@ -134,13 +137,21 @@ fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found,
         let along = |pick: fn(f64, f64) -> f64, start| seen.iter().map(|p| p[axis]).fold(start, pick);
         along(f64::max, f64::NEG_INFINITY) - along(f64::min, f64::INFINITY)
     };
-    let (width_px, height_px) = (f64::from(outline.bounds.width()), f64::from(outline.bounds.height()));
-    Ok(Found { contact, position, foot_px, size_ratio: [width_px / reach(0), height_px / reach(1)] })
+    let height_px = f64::from(outline.bounds.height());
+    let width_px = width_px(outline);
+    Ok(Found { contact, position, foot_px, foot_hidden, size_ratio: [width_px / reach(0), height_px / reach(1)] })
 }
 
-/// Where the object meets the ground: the centroid's column, and the row where most columns about it end. Of columns that
-/// end at something the map has not, which may stand in front, at most [`MAX_FOOT_HIDDEN`].
-fn foot_px(sight: &Sight<'_>, outline: &Outline) -> Result<[f64; 2], Unmet> {
+/// The median row's pixels: contours that wander have tips, and blobs bite pieces out.
+fn width_px(outline: &Outline) -> f64 {
+    let mut rows = std::collections::BTreeMap::new();
+    outline.pixels().for_each(|[_, v]| *rows.entry(v).or_insert(0.0) += 1.0);
+    median(&rows.into_values().collect::<Vec<_>>())
+}
+
+/// Where the object meets the ground: the centroid's column, and the row where most columns about it end; and the share
+/// of those columns that end at something the map has not, which may stand in front. They do not count while others do.
+fn foot(sight: &Sight<'_>, outline: &Outline) -> ([f64; 2], f64) {
     let (mut sum, mut count) = (0.0, 0.0);
     let mut ends = std::collections::BTreeMap::new();
     for [u, v] in outline.pixels() {
@@ -151,14 +162,14 @@ fn foot_px(sight: &Sight<'_>, outline: &Outline) -> Result<[f64; 2], Unmet> {
     let middle = sum / f64::max(count, 1.0);
     let reach = f64::from(outline.bounds.width()) * FOOT_WIDTH / 2.0;
     let near = |u: &u32| (f64::from(*u) + 0.5 - middle).abs() <= reach.max(1.0);
-    let all = ends.iter().filter(|(u, _)| near(u));
-    let total = all.clone().count();
-    let mut rows: Vec<u32> = all.filter(|(u, end)| shows_map_below(sight, **u, **end)).map(|(_, end)| *end).collect();
-    let hidden = 1.0 - rows.len() as f64 / total.max(1) as f64;
-    at_most("captured-entirely", hidden, MAX_FOOT_HIDDEN, "ratio")?;
+    let (seen, hidden): (Vec<_>, Vec<_>) =
+        ends.into_iter().filter(|(u, _)| near(u)).partition(|(u, end)| shows_map_below(sight, *u, *end));
+    let share = hidden.len() as f64 / (seen.len() + hidden.len()).max(1) as f64;
+    let columns = if share > MAX_FOOT_HIDDEN { [seen, hidden].concat() } else { seen };
+    let mut rows: Vec<u32> = columns.into_iter().map(|(_, end)| end).collect();
     rows.sort_unstable();
     let row = rows.get(((rows.len() as f64 * FOOT_ROW) as usize).min(rows.len().saturating_sub(1)));
-    Ok([middle, f64::from(row.copied().unwrap_or(outline.bounds.bottom))])
+    ([middle, f64::from(row.copied().unwrap_or(outline.bounds.bottom))], share)
 }
 
 fn descriptor(
@@ -168,6 +179,7 @@ fn descriptor(
     found: &Found,
 ) -> Result<DynamicDescriptor, Stop> {
     let settings = sight.settings;
+    at_most("captured-entirely", found.foot_hidden, MAX_FOOT_HIDDEN, "ratio")?;
     at_most("within-range", found.contact.norm(), settings.max_range_m, "m")?;
     let factor = found.size_ratio.iter().map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max);
     at_most("size", factor, settings.max_size_factor, "ratio")?;

@@ -87,6 +87,19 @@ fn a_person_whose_feet_a_wrong_blob_hides_is_refused() {
 }
 
 #[test]
+fn a_person_with_a_ragged_foot_is_one() {
+    // In the blocks of the field captures a tip beside the feet passed for a second person.
+    let person = at(0.0, 8.0, 0.0);
+    let mut labels = capture(&[object(PEDESTRIAN, person)]);
+    for row in 0..14usize {
+        labels[(431 + row) * 960 + 470 - row..(431 + row) * 960 + 480].fill(PEDESTRIAN.0);
+    }
+    let (_, proposals) = update(street(), labels, known(pose()));
+    let found = positions(&proposals);
+    assert!(found.len() == 1 && distance_m(&found[0], &person) < 0.5, "{proposals:?}");
+}
+
+#[test]
 fn a_picture_of_a_person_on_the_wall_has_no_ground_contact() {
     let mut labels = photo(street(), &pose());
     for v in 100..200 {
