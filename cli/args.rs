@@ -1,6 +1,7 @@
 //! The command line: names, options, units, defaults and help.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use jiff::Timestamp;
 use std::path::PathBuf;
 
 /// Keeps a 3D city map current from phone photos.
@@ -134,6 +135,27 @@ pub struct Settings {
     pub profile: Option<String>,
 }
 
+/// Where the position, height and heading of the prior come from, beside capture.json.
+#[derive(Debug, Args)]
+pub struct PriorFrom {
+    /// Take the prior from this NMEA log, at --at-time
+    #[arg(long, value_name = "FILE")]
+    pub nmea: Option<PathBuf>,
+    /// Time to look up in the log, with its zone, e.g. 2026-06-01T10:28:00+08:00; default: the capture's taken_at
+    #[arg(long, value_name = "T", requires = "nmea", value_parser = time)]
+    pub at_time: Option<Timestamp>,
+    /// Take the prior from the EXIF of this photo
+    #[arg(long, value_name = "FILE.jpg", conflicts_with = "nmea")]
+    pub photo: Option<PathBuf>,
+}
+
+impl PriorFrom {
+    /// Whether a log or photo is named.
+    pub fn is_given(&self) -> bool {
+        self.nmea.is_some() || self.photo.is_some()
+    }
+}
+
 /// Arguments of `localize`.
 #[derive(Debug, Args)]
 pub struct Localize {
@@ -141,6 +163,8 @@ pub struct Localize {
     pub map: PathBuf,
     /// capture.json
     pub capture: PathBuf,
+    #[command(flatten)]
+    pub prior: PriorFrom,
     /// VPS matcher; "resurvey plugins list" lists them
     #[arg(long, default_value = "semantic")]
     pub matcher: String,
@@ -167,6 +191,8 @@ pub struct Render {
     pub map: PathBuf,
     /// capture.json: its camera, and its prior pose unless --pose is given
     pub capture: Option<PathBuf>,
+    #[command(flatten)]
+    pub prior: PriorFrom,
     /// Pose to draw from: a JSON file with a "pose"; without a capture the camera is 960x720 with a 120° diagonal
     #[arg(long, value_name = "POSE.json")]
     pub pose: Option<PathBuf>,
@@ -186,7 +212,9 @@ pub struct Update {
     /// One or more capture.json
     #[arg(required = true)]
     pub captures: Vec<PathBuf>,
-    /// Take this pose instead of localizing: a JSON file with a "pose"
+    #[command(flatten)]
+    pub prior: PriorFrom,
+    /// Take this pose instead of localizing, with one capture: a JSON file with a "pose"
     #[arg(long, value_name = "POSE.json")]
     pub pose: Option<PathBuf>,
     /// VPS matcher
@@ -350,6 +378,12 @@ pub struct Completions {
 pub struct Man {
     /// Directory, made when it is missing
     pub out: PathBuf,
+}
+
+/// Parses a time with its zone.
+fn time(text: &str) -> Result<Timestamp, String> {
+    let expected = "expected a time with its zone, such as 2026-06-01T10:28:00+08:00";
+    text.parse().map_err(|_| format!("{expected}, found {text:?}"))
 }
 
 /// Parses exactly `N` finite numbers with commas between them.

@@ -11,7 +11,12 @@ use resurvey_schema::{ClassTable, Rejection};
 use serde_json::{Map, Value, json};
 
 /// The document of `localize --json`.
-pub fn located(located: &Located, matcher: &PluginInfo, crs: Crs, timings_ms: &Map<String, Value>) -> Value {
+pub fn located(
+    located: &Located,
+    matcher: &PluginInfo,
+    crs: Crs,
+    (prior, timings_ms): (&Value, &Map<String, Value>),
+) -> Value {
     let localization = &located.localization;
     let position = crs.wgs84_from_grid(localization.pose.position).ok();
     json!({
@@ -30,6 +35,7 @@ pub fn located(located: &Located, matcher: &PluginInfo, crs: Crs, timings_ms: &M
         "candidates": localization.candidates,
         "skipped": localization.skipped,
         "matcher": { "name": matcher.name, "version": matcher.version, "sha256": matcher.sha256.to_string() },
+        "prior": prior,
         "timings_ms": timings_ms,
     })
 }

@@ -5,11 +5,11 @@ use crate::args::{Localize, PluginSearch};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, UNRELIABLE};
+use crate::prior::{Placed, read_placed};
 use crate::tools::{Choices, load, registry};
-use resurvey_core::capture::{Capture, read_pose};
+use resurvey_core::capture::read_pose;
 use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
 use resurvey_core::store::MapFile;
-use resurvey_core::update::world_around;
 use resurvey_schema::Pose;
 use serde_json::{Map, json};
 use std::path::Path;
@@ -27,8 +27,8 @@ pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>
     let truth = options.truth.as_deref().map(read_pose).transpose()?;
     let mut timings = Map::new();
     let stage = console.stage("read");
-    let capture = Capture::read(&options.capture, snapshot.classes(), crs)?;
-    let world = world_around(&snapshot, capture.prior.pose.position)?;
+    let Placed { capture, world, prior } =
+        read_placed(&options.capture, &options.prior, None, (&snapshot, crs), console)?;
     timings.insert("read".to_owned(), json!(console.finish(&stage)));
     let stage = console.stage("localize");
     let services = SceneServices::new(&world, &capture, crs, &stage);
@@ -46,7 +46,7 @@ pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>
         })?;
         write_file(path, &picture)?;
     }
-    let result = document::located(&located, matcher.info(), crs, &timings);
+    let result = document::located(&located, matcher.info(), crs, (&prior, &timings));
     if let Some(path) = &options.out {
         write_file(path, &serde_json::to_vec_pretty(&result)?)?;
     }

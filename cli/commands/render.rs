@@ -4,8 +4,9 @@ use super::{crs_of, write_file};
 use crate::args::Render;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::prior::{Placed, read_placed};
 use resurvey_core::camera::Camera;
-use resurvey_core::capture::{Capture, read_pose};
+use resurvey_core::capture::read_pose;
 use resurvey_core::image::{Raster, write_grey16_png, write_label_png};
 use resurvey_core::render::{lidar, view};
 use resurvey_core::store::MapFile;
@@ -20,22 +21,22 @@ const DEPTH_STEP_M: f64 = 0.01;
 
 /// Draws the map from a pose.
 pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
-    if options.capture.is_none() && options.pose.is_none() {
-        return Err(Failure::usage("expected a capture.json, or --pose with a pose to draw from"));
-    }
     let map = MapFile::open_read_only(&options.map)?;
     let snapshot = map.snapshot(map.resolve(&options.at)?)?;
     let crs = crs_of(&map)?;
-    let capture = options.capture.as_deref().map(|path| Capture::read(path, snapshot.classes(), crs)).transpose()?;
     let given = options.pose.as_deref().map(read_pose).transpose()?;
-    let pose = given.or(capture.as_ref().map(|capture| capture.prior.pose));
-    let pose = pose.expect("one of both is given: checked above");
-    let camera = match capture {
-        Some(capture) => capture.camera,
-        None => paper_camera()?,
-    };
     let stage = console.stage("render");
-    let world = world_around(&snapshot, pose.position)?;
+    let (camera, pose, world) = match (&options.capture, given) {
+        (Some(path), given) => {
+            let Placed { capture, world, .. } = read_placed(path, &options.prior, given, (&snapshot, crs), console)?;
+            (capture.camera, given.unwrap_or(capture.prior.pose), world)
+        }
+        (None, Some(_)) if options.prior.is_given() => {
+            return Err(Failure::usage("expected a capture.json beside --nmea or --photo: they say no pitch and roll"));
+        }
+        (None, Some(pose)) => (paper_camera()?, pose, world_around(&snapshot, pose.position)?),
+        (None, None) => return Err(Failure::usage("expected a capture.json, or --pose with a pose to draw from")),
+    };
     let view = view(world.scene(true), &camera, &pose);
     let points = lidar::scan(&view, LIDAR_SPACING_M);
     let depth: Vec<u16> = view.range_m.values().iter().map(|range_m| grey(f64::from(*range_m))).collect();

@@ -6,6 +6,7 @@ use crate::commands::localize::pose_text;
 use crate::console::{Console, Stage};
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
+use crate::prior::{Placed, read_placed};
 use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, read_pose};
@@ -14,7 +15,7 @@ use resurvey_core::localize::{GateLimits, Located, SceneServices, World, localiz
 use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
 use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::MapFile;
-use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve, world_around};
+use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
     BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,
 };
@@ -25,6 +26,7 @@ use std::path::Path;
 /// Updates the map with every capture in turn. The exit code is 0 when any of them changed something, else that of the
 /// last one that did not.
 pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    refuse_one_for_several(options)?;
     let mut tools = Tools::load(options, plugins)?;
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
     let given = options.pose.as_deref().map(read_pose).transpose()?;
@@ -52,6 +54,23 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
         }
     }
     code
+}
+
+/// What belongs to one photo is refused with several captures.
+fn refuse_one_for_several(options: &Update) -> Result<(), Failure> {
+    let of_one = [
+        ("--pose", options.pose.is_some()),
+        ("--photo", options.prior.photo.is_some()),
+        ("--at-time", options.prior.at_time.is_some()),
+    ];
+    let count = options.captures.len();
+    match of_one.into_iter().find(|(_, is_given)| *is_given && count > 1) {
+        Some((name, _)) => {
+            let next = "update with one capture at a time";
+            Err(Failure::usage(format!("{name} belongs to one photo: expected one capture, found {count}; {next}")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The three plugins of one run.
@@ -92,6 +111,8 @@ struct Outcome {
     located: Located,
     resolution: Resolution,
     viewed_region: Option<BoxMm>,
+    /// The `prior` of the result.
+    prior: Value,
 }
 
 impl Run<'_> {
@@ -105,16 +126,17 @@ impl Run<'_> {
         let base = self.map.head()?;
         let snapshot = self.map.snapshot(base)?;
         let stage = console.stage("read");
-        let capture = Capture::read(path, snapshot.classes(), self.crs)?;
-        let world = world_around(&snapshot, given.unwrap_or(capture.prior.pose).position)?;
+        let Placed { capture, world, prior } =
+            read_placed(path, &self.options.prior, given, (&snapshot, self.crs), console)?;
         self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
         let located = self.locate(&world, &capture, given, tools, console)?;
         let matcher = tools.matcher.info().clone();
-        let outcome = if located.is_reliable() {
-            self.compare(&world, &capture, located, tools, console)?
+        let (resolution, viewed_region) = if located.is_reliable() {
+            self.compare(&world, &capture, &located, tools, console)?
         } else {
-            Outcome { located, resolution: Resolution::default(), viewed_region: None }
+            (Resolution::default(), None)
         };
+        let outcome = Outcome { located, resolution, viewed_region, prior };
         let stage = console.stage("commit");
         let committed = self.commit(base, &capture, given.is_some(), &outcome, tools)?;
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
@@ -143,10 +165,10 @@ impl Run<'_> {
         &mut self,
         world: &World,
         capture: &Capture,
-        located: Located,
+        located: &Located,
         tools: &mut Tools,
         console: &mut Console<'_>,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<(Resolution, Option<BoxMm>), Failure> {
         let mut time = |name: &'static str, console: &mut Console<'_>, stage: &Stage| {
             self.timings.insert(name.to_owned(), json!(console.finish(stage)));
         };
@@ -165,7 +187,7 @@ impl Run<'_> {
         let proposals = comparison.estimate(&mut tools.estimator, &services, &regions)?;
         time("estimate", console, &stage);
         let resolution = resolve(proposals, &regions, world.descriptors());
-        Ok(Outcome { located, resolution, viewed_region: comparison.viewed_region() })
+        Ok((resolution, comparison.viewed_region()))
     }
 
     /// Commits the changes, or records the attempt; a dry run does neither.
@@ -261,7 +283,7 @@ impl Run<'_> {
             "base_version": base.0,
             "version": committed.version.map(|version| version.0),
             "decision": decision,
-            "localization": document::located(&outcome.located, matcher, self.crs, &self.timings),
+            "localization": document::located(&outcome.located, matcher, self.crs, (&outcome.prior, &self.timings)),
             "changes": changes,
             "rejections": rejections.map(|rejection| document::rejection(rejection, classes)).collect::<Vec<_>>(),
             "plugins": used.iter().map(document::plugin_use).collect::<Vec<_>>(),

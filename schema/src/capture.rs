@@ -53,7 +53,8 @@ pub struct CameraFile {
     pub diagonal_fov_deg: Option<f64>,
 }
 
-/// The phone's rough pose. Either `latitude`, `longitude` or `easting`, `northing`.
+/// The phone's rough pose. Either `latitude`, `longitude` or `easting`, `northing`; neither where an NMEA log or a
+/// photo's EXIF says the position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorFile {
@@ -69,16 +70,18 @@ pub struct PriorFile {
     /// Grid northing, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub northing: Option<f64>,
-    /// Height of the camera, metres above `height_datum`.
-    pub height: f64,
-    /// `hkpd` or `ellipsoidal`; required, never guessed.
+    /// Height of the camera, metres above `height_datum`; unknown when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<f64>,
+    /// `hkpd` or `ellipsoidal`; required with `height`, never guessed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_datum: Option<String>,
     /// 1σ of the height, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_sigma_m: Option<f64>,
-    /// Heading, degrees clockwise from `north`.
-    pub yaw_deg: f64,
+    /// Heading, degrees clockwise from `north`; unknown when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yaw_deg: Option<f64>,
     /// Pitch, degrees, up positive.
     pub pitch_deg: f64,
     /// Roll, degrees, right side down positive.
@@ -89,7 +92,8 @@ pub struct PriorFile {
     /// `grid`, `true` or `magnetic`; grid when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub north: Option<String>,
-    /// Magnetic declination, degrees east; required with `magnetic`.
+    /// Magnetic declination, degrees east; required with `magnetic`. Beside an NMEA log or a photo's EXIF it is that of
+    /// their magnetic headings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declination_deg: Option<f64>,
     /// 1σ of the position in plan, metres.

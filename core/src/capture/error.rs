@@ -1,5 +1,6 @@
 //! Why a capture could not be read.
 
+use super::{ExifError, NmeaError};
 use crate::camera::CameraError;
 use crate::crs::CrsError;
 use crate::image::ImageError;
@@ -52,6 +53,35 @@ pub enum CaptureError {
         path: PathBuf,
         /// Why.
         source: CrsError,
+    },
+    /// The EXIF of a photo says nothing about where it was taken.
+    #[error("{}: {source}", path.display())]
+    Photo {
+        /// The photo.
+        path: PathBuf,
+        /// Why.
+        source: ExifError,
+    },
+    /// An NMEA log says nothing about the time.
+    #[error("{}: {source}", path.display())]
+    Nmea {
+        /// The log.
+        path: PathBuf,
+        /// Why.
+        source: NmeaError,
+    },
+    /// A height that should come from the ground, where there is none.
+    #[error(
+        "{}: expected prior.height, or ground of the map at {easting_m:.0}, {northing_m:.0} to take it from; found neither",
+        path.display()
+    )]
+    NoGround {
+        /// The capture.
+        path: PathBuf,
+        /// Easting, metres.
+        easting_m: f64,
+        /// Northing, metres.
+        northing_m: f64,
     },
     /// The label image cannot be read.
     #[error(transparent)]

@@ -1,6 +1,6 @@
 //! Reading `capture.json` and the label image beside it.
 
-use super::{CaptureError, prior_from_file};
+use super::{CaptureError, PriorSource, RoughCapture};
 use crate::camera::Camera;
 use crate::crs::Crs;
 use crate::image::{ImageError, LabelImage, LabelReading, read_labels};
@@ -29,19 +29,22 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Reads `path` and the label image that it names, for a map with `classes` in `crs`.
+    /// Reads `path` and the label image that it names, for a map with `classes` in `crs`. The whole prior must be in the
+    /// file; [`RoughCapture`] also reads others.
     pub fn read(path: &Path, classes: &ClassTable, crs: Crs) -> Result<Self, CaptureError> {
-        let text = std::fs::read(path).map_err(|source| CaptureError::Io { path: path.to_owned(), source })?;
-        let file: CaptureFile = serde_json::from_slice(&text)
-            .map_err(|error| CaptureError::Form { path: path.to_owned(), reason: error.to_string() })?;
-        if file.format != FORMAT {
-            let reason = format!("format is {:?}; expected {FORMAT:?}", file.format);
-            return Err(CaptureError::Form { path: path.to_owned(), reason });
-        }
+        RoughCapture::read(path, &PriorSource::Capture, classes, crs)?.settled_without_map()
+    }
+
+    /// The capture of `file`, whose text is `text`, with its label image.
+    pub(super) fn with_labels(
+        path: &Path,
+        (file, text): &(CaptureFile, Vec<u8>),
+        prior: Prior,
+        taken_at: Option<Timestamp>,
+        classes: &ClassTable,
+    ) -> Result<Self, CaptureError> {
         let camera =
             Camera::from_file(&file.camera).map_err(|source| CaptureError::Camera { path: path.to_owned(), source })?;
-        let prior = prior_from_file(&file.prior, crs, path)?;
-        let taken_at = file.taken_at.as_deref().map(|time| parse_time(time, path)).transpose()?;
         let label_path = path.parent().unwrap_or(Path::new("")).join(&file.labels);
         let label_bytes =
             std::fs::read(&label_path).map_err(|source| CaptureError::Io { path: label_path.clone(), source })?;
@@ -51,12 +54,25 @@ impl Capture {
         if found != expected {
             return Err(CaptureError::Size { labels: label_path, capture: path.to_owned(), found, expected });
         }
-        let digest = Digest::of(&[Digest::of(&text).0, Digest::of(&label_bytes).0].concat());
+        let digest = Digest::of(&[Digest::of(text).0, Digest::of(&label_bytes).0].concat());
         Ok(Self { labels, label_bytes, camera, prior, taken_at, digest })
     }
 }
 
-fn parse_time(time: &str, path: &Path) -> Result<Timestamp, CaptureError> {
+/// `capture.json` and its text.
+pub(super) fn read_file(path: &Path) -> Result<(CaptureFile, Vec<u8>), CaptureError> {
+    let text = std::fs::read(path).map_err(|source| CaptureError::Io { path: path.to_owned(), source })?;
+    let file: CaptureFile = serde_json::from_slice(&text)
+        .map_err(|error| CaptureError::Form { path: path.to_owned(), reason: error.to_string() })?;
+    if file.format != FORMAT {
+        let reason = format!("format is {:?}; expected {FORMAT:?}", file.format);
+        return Err(CaptureError::Form { path: path.to_owned(), reason });
+    }
+    Ok((file, text))
+}
+
+/// The time of a capture.
+pub(super) fn parse_time(time: &str, path: &Path) -> Result<Timestamp, CaptureError> {
     time.parse().map_err(|_| CaptureError::Value {
         path: path.to_owned(),
         key: "taken_at",

@@ -1,9 +1,16 @@
 //! The phone's rough pose, checked and brought into the map frame.
+//!
+//! Position, height and heading may each come from `capture.json` or from a [`Fix`] of another file. What the fix says
+//! wins; what it does not say is taken from `capture.json`; pitch and roll are always those of `capture.json`.
 
-use super::CaptureError;
+use super::declination::declination_deg;
+use super::fix::{Fix, North, SensedDatum};
+use super::{CaptureError, PriorOrigin, PriorReport};
 use crate::crs::{Crs, CrsError};
+use jiff::Timestamp;
 use resurvey_schema::service::Prior;
 use resurvey_schema::{GridPoint, Pose, PriorFile, Wgs84};
+use std::f64::consts::PI;
 use std::path::Path;
 
 /// 1σ of a phone's position in a street, metres, where the capture does not say: the paper's phone was off by 13 m in
@@ -11,54 +18,155 @@ use std::path::Path;
 const POSITION_SIGMA_M: f64 = 15.0;
 /// 1σ of a phone's compass between buildings, degrees: the paper's was off by up to 34°.
 const YAW_SIGMA_DEG: f64 = 20.0;
+/// 1σ of the heading where nobody says one: any direction is as likely.
+const ANY_YAW_SIGMA_RAD: f64 = PI;
 /// 1σ of a height that was taken from the ground below, metres.
-const HEIGHT_SIGMA_M: f64 = 0.5;
+pub(super) const HEIGHT_SIGMA_M: f64 = 0.5;
 /// 1σ of a phone's pitch and roll from gravity, degrees.
 const TILT_SIGMA_DEG: f64 = 1.0;
+/// 1σ above which the ground of the map says more about a height than GNSS does, metres.
+const GNSS_HEIGHT_LIMIT_M: f64 = 2.0;
 
-/// The prior in the frame of a map in `crs`; `path` is named in errors.
-pub fn prior_from_file(file: &PriorFile, crs: Crs, path: &Path) -> Result<Prior, CaptureError> {
-    let check = Check { path };
-    let position = position(file, crs, &check)?;
+/// A prior whose height may still have to come from the ground of the map.
+#[derive(Clone, Debug)]
+pub(super) struct RoughPrior {
+    pub prior: Prior,
+    pub height: RoughHeight,
+    pub report: PriorReport,
+}
+
+/// What is known of the height of a prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum RoughHeight {
+    /// Enough: it is in the prior.
+    Known,
+    /// It is in the prior, but the ground is a better guess.
+    Loose,
+    /// Nothing: that of the prior is 0.
+    Unknown,
+}
+
+/// What a prior is made from.
+pub(super) struct PriorInput<'a> {
+    pub file: &'a PriorFile,
+    /// The fix of another file, and which kind of file that is.
+    pub fix: Option<(&'a Fix, PriorOrigin)>,
+    pub crs: Crs,
+    pub taken_at: Option<Timestamp>,
+    /// `capture.json`, named in errors.
+    pub path: &'a Path,
+}
+
+/// The prior of `input` in the frame of its map.
+pub(super) fn rough_prior(input: &PriorInput<'_>) -> Result<RoughPrior, CaptureError> {
+    let file = input.file;
+    let check = Check { path: input.path };
+    let place = place(input, &check)?;
+    let (yaw_rad, heading_from) = heading(input, place.position, &check)?;
     let pose = Pose {
-        position,
-        yaw_rad: yaw_rad(file, crs, position, &check)?,
+        position: place.position,
+        yaw_rad,
         pitch_rad: check.within("prior.pitch_deg", file.pitch_deg, 90.0, "-90 to 90 degrees")?.to_radians(),
         roll_rad: check.within("prior.roll_deg", file.roll_deg, 180.0, "-180 to 180 degrees")?.to_radians(),
     };
-    Ok(Prior {
+    let yaw_sigma_rad = check.sigma("prior.yaw_sigma_deg", file.yaw_sigma_deg, YAW_SIGMA_DEG)?.to_radians();
+    let position_sigma_m = check.sigma("prior.position_sigma_m", file.position_sigma_m, POSITION_SIGMA_M)?;
+    let stated_m = input.fix.and_then(|(fix, _)| fix.position_sigma_m);
+    let prior = Prior {
         pose,
-        position_sigma_m: check.sigma("prior.position_sigma_m", file.position_sigma_m, POSITION_SIGMA_M)?,
-        height_sigma_m: check.sigma("prior.height_sigma_m", file.height_sigma_m, HEIGHT_SIGMA_M)?,
-        yaw_sigma_rad: check.sigma("prior.yaw_sigma_deg", file.yaw_sigma_deg, YAW_SIGMA_DEG)?.to_radians(),
+        position_sigma_m: stated_m.unwrap_or(position_sigma_m),
+        height_sigma_m: place.height_sigma_m,
+        yaw_sigma_rad: heading_from.map_or(ANY_YAW_SIGMA_RAD, |_| yaw_sigma_rad),
         tilt_sigma_rad: check.sigma("prior.tilt_sigma_deg", file.tilt_sigma_deg, TILT_SIGMA_DEG)?.to_radians(),
-    })
+    };
+    let mut report = PriorReport::new(input.fix.map_or(PriorOrigin::Capture, |(_, origin)| origin));
+    (report.height_from, report.heading_from) = (place.height_from, heading_from);
+    if heading_from.is_none() {
+        report.notes.push("nobody says the heading: every direction is looked at".to_owned());
+    }
+    if place.is_sea_level {
+        report.notes.push("the height is above sea level by an unknown geoid: taken for the map's datum".to_owned());
+    }
+    Ok(RoughPrior { prior, height: place.height, report })
 }
 
-fn position(file: &PriorFile, crs: Crs, check: &Check<'_>) -> Result<GridPoint, CaptureError> {
-    let ellipsoidal = match file.height_datum.as_deref() {
-        Some("hkpd") => false,
-        Some("ellipsoidal") => true,
+/// A position and what is known of its height.
+struct Place {
+    position: GridPoint,
+    height: RoughHeight,
+    height_sigma_m: f64,
+    height_from: PriorOrigin,
+    is_sea_level: bool,
+}
+
+fn place(input: &PriorInput<'_>, check: &Check<'_>) -> Result<Place, CaptureError> {
+    let file_sigma_m = check.sigma("prior.height_sigma_m", input.file.height_sigma_m, HEIGHT_SIGMA_M)?;
+    let sensed = input.fix.and_then(|(fix, origin)| Some((fix.height?, origin)));
+    let (metres, height, height_sigma_m, height_from) = match sensed {
+        Some((sensed, origin)) => {
+            let is_tight = sensed.sigma_m <= GNSS_HEIGHT_LIMIT_M;
+            let known = if is_tight { RoughHeight::Known } else { RoughHeight::Loose };
+            let metres = match sensed.datum {
+                SensedDatum::Ellipsoid => Metres::Ellipsoidal(sensed.height_m),
+                SensedDatum::SeaLevel => Metres::OfTheMap(sensed.height_m),
+            };
+            (metres, known, sensed.sigma_m, origin)
+        }
+        None => match file_height(input.file, check)? {
+            Some(metres) => (metres, RoughHeight::Known, file_sigma_m, PriorOrigin::Capture),
+            None => (Metres::OfTheMap(0.0), RoughHeight::Unknown, file_sigma_m, PriorOrigin::Ground),
+        },
+    };
+    let position = position(input, metres, check)?;
+    let is_sea_level = sensed.is_some_and(|(sensed, _)| sensed.datum == SensedDatum::SeaLevel);
+    Ok(Place { position, height, height_sigma_m, height_from, is_sea_level })
+}
+
+/// A height above one of the two datums, metres.
+#[derive(Clone, Copy)]
+enum Metres {
+    OfTheMap(f64),
+    Ellipsoidal(f64),
+}
+
+fn file_height(file: &PriorFile, check: &Check<'_>) -> Result<Option<Metres>, CaptureError> {
+    let Some(height) = file.height else { return Ok(None) };
+    let height_m = || check.within("prior.height", height, 10_000.0, "-10000 to 10000 m");
+    match file.height_datum.as_deref() {
+        Some("hkpd") => Ok(Some(Metres::OfTheMap(height_m()?))),
+        Some("ellipsoidal") => Ok(Some(Metres::Ellipsoidal(height_m()?))),
         other => {
             let found = other.map_or_else(|| "missing".to_owned(), |datum| format!("{datum:?}"));
-            return Err(check.value("prior.height_datum", found, "\"hkpd\" or \"ellipsoidal\"; it is never guessed"));
+            Err(check.value("prior.height_datum", found, "\"hkpd\" or \"ellipsoidal\"; it is never guessed"))
         }
+    }
+}
+
+fn position(input: &PriorInput<'_>, metres: Metres, check: &Check<'_>) -> Result<GridPoint, CaptureError> {
+    let crs = input.crs;
+    let geographic = |latitude_deg, longitude_deg| match metres {
+        Metres::Ellipsoidal(ellipsoidal_height_m) => {
+            crs.grid_from_wgs84(Wgs84 { latitude_deg, longitude_deg, ellipsoidal_height_m })
+        }
+        Metres::OfTheMap(height_m) => crs.grid_from_latitude_longitude(latitude_deg, longitude_deg, height_m),
     };
-    let height_m = check.within("prior.height", file.height, 10_000.0, "-10000 to 10000 m")?;
-    let position = match (file.latitude, file.longitude, file.easting, file.northing) {
-        (Some(latitude), Some(longitude), None, None) => {
+    let file = input.file;
+    let position = match (input.fix, file.latitude, file.longitude, file.easting, file.northing) {
+        (Some((fix, _)), ..) => geographic(fix.latitude_deg, fix.longitude_deg),
+        (None, Some(latitude), Some(longitude), None, None) => {
             let latitude_deg = check.within("prior.latitude", latitude, 90.0, "-90 to 90 degrees")?;
             let longitude_deg = check.within("prior.longitude", longitude, 180.0, "-180 to 180 degrees")?;
-            if ellipsoidal {
-                crs.grid_from_wgs84(Wgs84 { latitude_deg, longitude_deg, ellipsoidal_height_m: height_m })
-            } else {
-                crs.grid_from_latitude_longitude(latitude_deg, longitude_deg, height_m)
-            }
+            geographic(latitude_deg, longitude_deg)
         }
-        (None, None, Some(easting), Some(northing)) => {
+        (None, None, None, Some(easting), Some(northing)) => {
             let easting_m = check.within("prior.easting", easting, 1e8, "a finite number of metres")?;
             let northing_m = check.within("prior.northing", northing, 1e8, "a finite number of metres")?;
-            on_the_grid(GridPoint::new(easting_m, northing_m, height_m), ellipsoidal, crs)
+            on_the_grid([easting_m, northing_m], metres, crs)
+        }
+        (None, None, None, None, None) => {
+            let expected = "either latitude and longitude or easting and northing; or give --nmea with a log, or \
+                            --photo with a photo whose EXIF has the position";
+            return Err(check.value("prior", "without a position".to_owned(), expected));
         }
         _ => {
             let found = "not one complete pair".to_owned();
@@ -69,34 +177,72 @@ fn position(file: &PriorFile, crs: Crs, check: &Check<'_>) -> Result<GridPoint, 
 }
 
 /// The grid point whose height is either above the map's datum already or above the ellipsoid.
-fn on_the_grid(point: GridPoint, ellipsoidal: bool, crs: Crs) -> Result<GridPoint, CrsError> {
+fn on_the_grid([easting_m, northing_m]: [f64; 2], metres: Metres, crs: Crs) -> Result<GridPoint, CrsError> {
+    let (Metres::OfTheMap(height_m) | Metres::Ellipsoidal(height_m)) = metres;
+    let point = GridPoint::new(easting_m, northing_m, height_m);
     let separation_m = crs.wgs84_from_grid(point)?.ellipsoidal_height_m - point.height_m;
-    let height_m = if ellipsoidal { point.height_m - separation_m } else { point.height_m };
-    Ok(GridPoint { height_m, ..point })
+    let is_ellipsoidal = matches!(metres, Metres::Ellipsoidal(_));
+    Ok(if is_ellipsoidal { GridPoint { height_m: height_m - separation_m, ..point } } else { point })
 }
 
-fn yaw_rad(file: &PriorFile, crs: Crs, position: GridPoint, check: &Check<'_>) -> Result<f64, CaptureError> {
-    let yaw_rad = check.within("prior.yaw_deg", file.yaw_deg, 720.0, "-720 to 720 degrees")?.to_radians();
-    let convergence = || {
-        crs.convergence_rad(position).map_err(|source| CaptureError::Position { path: check.path.to_owned(), source })
-    };
-    match (file.north.as_deref().unwrap_or("grid"), file.declination_deg) {
-        ("grid", None) => Ok(yaw_rad),
-        ("true", None) => Ok(yaw_rad - convergence()?),
+/// Heading from grid north, and who says it; 0 where nobody does.
+fn heading(
+    input: &PriorInput<'_>,
+    position: GridPoint,
+    check: &Check<'_>,
+) -> Result<(f64, Option<PriorOrigin>), CaptureError> {
+    let on_the_map = |source| CaptureError::Position { path: check.path.to_owned(), source };
+    let convergence = || input.crs.convergence_rad(position).map_err(on_the_map);
+    if let Some((heading, origin)) = input.fix.and_then(|(fix, origin)| Some((fix.heading?, origin))) {
+        let declination_deg = match heading.north {
+            North::True => 0.0,
+            North::Magnetic => declination(input, position, check)?,
+        };
+        let yaw_rad = (heading.heading_deg + declination_deg).to_radians() - convergence()?;
+        return Ok((yaw_rad, Some(origin)));
+    }
+    let Some(yaw_deg) = input.file.yaw_deg else { return Ok((0.0, None)) };
+    let yaw_rad = check.within("prior.yaw_deg", yaw_deg, 720.0, "-720 to 720 degrees")?.to_radians();
+    let north = input.file.north.as_deref().unwrap_or("grid");
+    let yaw_rad = match (north, input.file.declination_deg) {
+        ("grid" | "true", Some(declination)) if input.fix.is_none() => {
+            let expected = "no value, because prior.north is not \"magnetic\"";
+            return Err(check.value("prior.declination_deg", declination.to_string(), expected));
+        }
+        ("grid", _) => yaw_rad,
+        ("true", _) => yaw_rad - convergence()?,
         ("magnetic", Some(declination)) => {
-            let declination_deg = check.within("prior.declination_deg", declination, 180.0, "-180 to 180 degrees")?;
-            Ok(yaw_rad + declination_deg.to_radians() - convergence()?)
+            yaw_rad + stated_declination(declination, check)?.to_radians() - convergence()?
         }
         ("magnetic", None) => {
             let expected = "the magnetic declination in degrees east, because prior.north is \"magnetic\"";
-            Err(check.value("prior.declination_deg", "missing".to_owned(), expected))
+            return Err(check.value("prior.declination_deg", "missing".to_owned(), expected));
         }
-        ("grid" | "true", Some(declination)) => {
-            let expected = "no value, because prior.north is not \"magnetic\"";
-            Err(check.value("prior.declination_deg", declination.to_string(), expected))
+        (other, _) => {
+            return Err(check.value("prior.north", format!("{other:?}"), "\"grid\", \"true\" or \"magnetic\""));
         }
-        (other, _) => Err(check.value("prior.north", format!("{other:?}"), "\"grid\", \"true\" or \"magnetic\"")),
+    };
+    Ok((yaw_rad, Some(PriorOrigin::Capture)))
+}
+
+fn stated_declination(declination: f64, check: &Check<'_>) -> Result<f64, CaptureError> {
+    check.within("prior.declination_deg", declination, 180.0, "-180 to 180 degrees")
+}
+
+/// Declination of a heading that was sensed: the stated one, else that of the World Magnetic Model on the day.
+fn declination(input: &PriorInput<'_>, position: GridPoint, check: &Check<'_>) -> Result<f64, CaptureError> {
+    if let Some(declination) = input.file.declination_deg {
+        return stated_declination(declination, check);
     }
+    let missing = |reason: String| {
+        let expected = "the magnetic declination in degrees east, because the heading is magnetic and the World \
+                        Magnetic Model cannot be asked";
+        check.value("prior.declination_deg", format!("missing ({reason})"), expected)
+    };
+    let taken_at = input.taken_at.ok_or_else(|| missing("no date".to_owned()))?;
+    let at = input.crs.wgs84_from_grid(position);
+    let at = at.map_err(|source| CaptureError::Position { path: check.path.to_owned(), source })?;
+    declination_deg(at, taken_at).map_err(missing)
 }
 
 struct Check<'a> {
@@ -124,76 +270,5 @@ impl Check<'_> {
         } else {
             Err(self.value(key, value.to_string(), "0 to 1000"))
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn file() -> PriorFile {
-        serde_json::from_str(
-            r#"{"latitude":22.299139665,"longitude":114.17116039,"height":6.089,"height_datum":"hkpd",
-                "yaw_deg":262.171,"pitch_deg":10.073,"roll_deg":0.679}"#,
-        )
-        .unwrap()
-    }
-
-    fn read(file: &PriorFile) -> Result<Prior, CaptureError> {
-        prior_from_file(file, Crs::Hk1980, Path::new("capture.json"))
-    }
-
-    #[test]
-    fn a_latitude_of_91_degrees_is_refused_by_name() {
-        let message = read(&PriorFile { latitude: Some(91.0), ..file() }).unwrap_err().to_string();
-        assert_eq!(message, "capture.json: prior.latitude is 91; expected -90 to 90 degrees");
-    }
-
-    #[test]
-    fn a_height_without_a_datum_is_refused_not_guessed() {
-        let message = read(&PriorFile { height_datum: None, ..file() }).unwrap_err().to_string();
-        assert!(message.contains("prior.height_datum is missing"), "{message}");
-    }
-
-    #[test]
-    fn half_a_position_is_refused() {
-        assert!(read(&PriorFile { longitude: None, ..file() }).is_err());
-        assert!(read(&PriorFile { easting: Some(835_600.0), northing: Some(817_800.0), ..file() }).is_err());
-    }
-
-    #[test]
-    fn grid_and_geographic_positions_and_both_heights_agree() {
-        let from_wgs84 = read(&file()).unwrap().pose.position;
-        let position = Crs::Hk1980.wgs84_from_grid(from_wgs84).unwrap();
-        let ellipsoidal = |file: PriorFile| PriorFile {
-            height: position.ellipsoidal_height_m,
-            height_datum: Some("ellipsoidal".to_owned()),
-            ..file
-        };
-        let on_grid = PriorFile {
-            latitude: None,
-            longitude: None,
-            easting: Some(from_wgs84.easting_m),
-            northing: Some(from_wgs84.northing_m),
-            ..file()
-        };
-        for other in [ellipsoidal(file()), on_grid.clone(), ellipsoidal(on_grid)] {
-            let found = read(&other).unwrap().pose.position;
-            assert!(found.plan_distance_m(&from_wgs84) < 1e-3 && (found.height_m - from_wgs84.height_m).abs() < 1e-3);
-        }
-    }
-
-    #[test]
-    fn magnetic_north_needs_a_declination_and_true_north_the_convergence() {
-        let north =
-            |north: &str, declination_deg| PriorFile { north: Some(north.to_owned()), declination_deg, ..file() };
-        assert!(read(&north("magnetic", None)).is_err());
-        assert!(read(&north("up", None)).is_err());
-        let grid = read(&north("grid", None)).unwrap();
-        let by_true = read(&north("true", None)).unwrap();
-        let convergence = Crs::Hk1980.convergence_rad(grid.pose.position).unwrap();
-        assert!((grid.pose.yaw_rad - by_true.pose.yaw_rad - convergence).abs() < 1e-12);
-        let magnetic = read(&north("magnetic", Some(-3.0))).unwrap();
-        assert!((magnetic.pose.yaw_rad - by_true.pose.yaw_rad + 3_f64.to_radians()).abs() < 1e-12);
     }
 }
