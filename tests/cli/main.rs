@@ -15,5 +15,6 @@ mod map_files;
 mod models;
 mod page;
 mod plugin_files;
+mod priors;
 mod updates;
 mod usage;

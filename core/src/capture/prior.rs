@@ -41,7 +41,10 @@ pub(super) enum RoughHeight {
     /// Enough: it is in the prior.
     Known,
     /// It is in the prior, but the ground is a better guess.
-    Loose,
+    Loose {
+        /// Whether it is above sea level by an unknown geoid.
+        is_sea_level: bool,
+    },
     /// Nothing: that of the prior is 0.
     Unknown,
 }
@@ -84,9 +87,6 @@ pub(super) fn rough_prior(input: &PriorInput<'_>) -> Result<RoughPrior, CaptureE
     if heading_from.is_none() {
         report.notes.push("nobody says the heading: every direction is looked at".to_owned());
     }
-    if place.is_sea_level {
-        report.notes.push("the height is above sea level by an unknown geoid: taken for the map's datum".to_owned());
-    }
     Ok(RoughPrior { prior, height: place.height, report })
 }
 
@@ -96,7 +96,6 @@ struct Place {
     height: RoughHeight,
     height_sigma_m: f64,
     height_from: PriorOrigin,
-    is_sea_level: bool,
 }
 
 fn place(input: &PriorInput<'_>, check: &Check<'_>) -> Result<Place, CaptureError> {
@@ -105,7 +104,8 @@ fn place(input: &PriorInput<'_>, check: &Check<'_>) -> Result<Place, CaptureErro
     let (metres, height, height_sigma_m, height_from) = match sensed {
         Some((sensed, origin)) => {
             let is_tight = sensed.sigma_m <= GNSS_HEIGHT_LIMIT_M;
-            let known = if is_tight { RoughHeight::Known } else { RoughHeight::Loose };
+            let is_sea_level = sensed.datum == SensedDatum::SeaLevel;
+            let known = if is_tight { RoughHeight::Known } else { RoughHeight::Loose { is_sea_level } };
             let metres = match sensed.datum {
                 SensedDatum::Ellipsoid => Metres::Ellipsoidal(sensed.height_m),
                 SensedDatum::SeaLevel => Metres::OfTheMap(sensed.height_m),
@@ -118,8 +118,7 @@ fn place(input: &PriorInput<'_>, check: &Check<'_>) -> Result<Place, CaptureErro
         },
     };
     let position = position(input, metres, check)?;
-    let is_sea_level = sensed.is_some_and(|(sensed, _)| sensed.datum == SensedDatum::SeaLevel);
-    Ok(Place { position, height, height_sigma_m, height_from, is_sea_level })
+    Ok(Place { position, height, height_sigma_m, height_from })
 }
 
 /// A height above one of the two datums, metres.

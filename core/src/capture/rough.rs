@@ -32,6 +32,18 @@ pub enum PriorSource {
     Photo(PathBuf),
 }
 
+impl PriorSource {
+    /// A position that is nowhere on the map is a mistake of the file that says it.
+    fn blamed_for(&self, error: CaptureError) -> CaptureError {
+        match (self, error) {
+            (Self::Nmea { log: path, .. } | Self::Photo(path), CaptureError::Position { source, .. }) => {
+                CaptureError::Position { path: path.clone(), source }
+            }
+            (_, error) => error,
+        }
+    }
+}
+
 /// A capture whose height may still have to come from the ground of the map.
 #[derive(Clone, Debug)]
 pub struct RoughCapture {
@@ -51,7 +63,7 @@ impl RoughCapture {
         let taken_at = stated_at.or(said.fix.and_then(|(fix, _)| fix.taken_at));
         let fix = said.fix.as_ref().map(|(fix, origin)| (fix, *origin));
         let input = PriorInput { file: &file.prior, fix, crs, taken_at, path };
-        let RoughPrior { prior, height, mut report } = rough_prior(&input)?;
+        let RoughPrior { prior, height, mut report } = rough_prior(&input).map_err(|error| source.blamed_for(error))?;
         report.sentences = said.sentences;
         report.notes.extend(said.sentences.filter(|counts| counts.skipped() > 0).map(|counts| skipped(&counts)));
         let capture = Capture::with_labels(path, &file_and_text, prior, taken_at, classes)?;
@@ -83,13 +95,19 @@ impl RoughCapture {
                 report.notes.push(if height == RoughHeight::Unknown {
                     format!("nobody says the height: taken {ground}")
                 } else {
-                    format!("height {sensed_m:.1} m of the {from} (1 sigma {sensed_sigma_m:.0} m) not used: taken {ground}")
+                    format!(
+                        "height {sensed_m:.1} m of the {from} (1 sigma {sensed_sigma_m:.0} m) not used: taken {ground}"
+                    )
                 });
                 report.height_from = PriorOrigin::Ground;
             }
-            None if height == RoughHeight::Loose && LAND_M.contains(&sensed_m) => report.notes.push(format!(
-                "no ground of the map below the prior: height {sensed_m:.1} m of the {from}, 1 sigma {sensed_sigma_m:.0} m"
-            )),
+            None if height != RoughHeight::Unknown && LAND_M.contains(&sensed_m) => {
+                let is_sea_level = height == RoughHeight::Loose { is_sea_level: true };
+                let datum = if is_sea_level { ", sea level taken for the map's datum" } else { "" };
+                report.notes.push(format!(
+                    "no ground of the map below: height {sensed_m:.1} m of the {from}, 1 sigma {sensed_sigma_m:.0} m{datum}"
+                ));
+            }
             None => {
                 let (easting_m, northing_m) = (position.easting_m, position.northing_m);
                 return Err(CaptureError::NoGround { path, easting_m, northing_m });

@@ -161,7 +161,10 @@ fn a_gnss_height_is_brought_to_the_datum_and_doubted() {
     let Wgs84 { ellipsoidal_height_m, .. } = Crs::Hk1980.wgs84_from_grid(position).unwrap();
     let loose = rough(&file(), Some(&with(ellipsoidal_height_m, SensedDatum::Ellipsoid, GNSS_HEIGHT_SIGMA_M))).unwrap();
     assert!((loose.prior.pose.position.height_m - 5.8).abs() < 1e-6);
-    assert_eq!((loose.height, loose.report.height_from), (RoughHeight::Loose, PriorOrigin::Photo));
+    assert_eq!(
+        (loose.height, loose.report.height_from),
+        (RoughHeight::Loose { is_sea_level: false }, PriorOrigin::Photo)
+    );
     let tight = rough(&file(), Some(&with(5.8, SensedDatum::SeaLevel, 0.1))).unwrap();
     assert!((tight.prior.pose.position.height_m - 5.8).abs() < 1e-6 && tight.height == RoughHeight::Known);
     assert!((tight.prior.height_sigma_m - 0.1).abs() < 1e-12);
