@@ -22,7 +22,21 @@ fn keys(value: &Value) -> Vec<&str> {
         .collect()
 }
 
-const LOCALIZATION: [&str; 13] = [
+const PRIOR: [&str; 11] = [
+    "pose",
+    "position_sigma_m",
+    "height_sigma_m",
+    "yaw_sigma_deg",
+    "tilt_sigma_deg",
+    "source",
+    "file",
+    "height_from",
+    "heading_from",
+    "sentences",
+    "notes",
+];
+
+const LOCALIZATION: [&str; 14] = [
     "pose",
     "latitude",
     "longitude",
@@ -35,6 +49,7 @@ const LOCALIZATION: [&str; 13] = [
     "candidates",
     "skipped",
     "matcher",
+    "prior",
     "timings_ms",
 ];
 
@@ -102,8 +117,8 @@ fn a_dry_run_says_what_would_change_and_writes_not_one_byte() {
 #[test]
 fn several_captures_give_an_array_and_one_that_changed_something_is_exit_0() {
     let bench = Bench::with_street();
-    let (capture, pose) = (capture(), pose());
-    let document = bench.json("update", &[text(&capture), text(&capture), "--pose", text(&pose)]);
+    let capture = capture();
+    let document = bench.json("update", &[text(&capture), text(&capture)]);
     let decisions: Vec<_> = document.as_array().unwrap().iter().map(|one| one["decision"].as_str().unwrap()).collect();
     assert_eq!(decisions, ["committed", "nothing"]);
     assert_eq!(bench.head(), 2);
@@ -112,8 +127,8 @@ fn several_captures_give_an_array_and_one_that_changed_something_is_exit_0() {
 #[test]
 fn a_bad_capture_among_good_ones_still_prints_what_was_committed() {
     let bench = Bench::with_street();
-    let (capture, pose, bad) = (capture(), pose(), bench.file("bad.json", "{}"));
-    let run = bench.run("update", &[text(&capture), &bad, "--pose", text(&pose), "--json"]);
+    let (capture, bad) = (capture(), bench.file("bad.json", "{}"));
+    let run = bench.run("update", &[text(&capture), &bad, "--json"]);
     assert_eq!(run.code, 10, "{}", run.err);
     assert!(run.err.contains("bad.json"), "{}", run.err);
     let document = run.json();
@@ -130,6 +145,8 @@ fn a_pose_that_is_found_can_be_written_and_read_again() {
     assert_eq!(keys(&document), LOCALIZATION);
     assert_eq!(keys(&document["pose"]), ["easting", "northing", "height", "yaw_deg", "pitch_deg", "roll_deg"]);
     assert_eq!(keys(&document["matcher"]), ["name", "version", "sha256"]);
+    assert_eq!(keys(&document["prior"]), PRIOR);
+    assert_eq!((&document["prior"]["source"], &document["prior"]["file"]), (&json!("capture"), &Value::Null));
     for gate in document["gates"].as_array().unwrap() {
         assert_eq!(keys(gate), ["name", "measured", "limit", "unit", "passed"]);
     }
