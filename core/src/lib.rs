@@ -5,6 +5,7 @@
 pub mod camera;
 pub mod capture;
 pub mod crs;
+pub mod evaluate;
 pub mod export;
 pub mod image;
 pub mod localize;
