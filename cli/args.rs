@@ -54,6 +54,8 @@ pub enum Command {
     Apply(Apply),
     /// Write a version or region of the map to another format; changes nothing in the map
     Export(Export),
+    /// Compare matchers on captures with known truth; changes nothing on disk but the file you name with --csv
+    Eval(Eval),
     /// List and describe plugins; changes nothing
     #[command(subcommand)]
     Plugins(Plugins),
@@ -136,7 +138,7 @@ pub struct Settings {
 }
 
 /// Where the position, height and heading of the prior come from, beside capture.json.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct PriorFrom {
     /// Take the prior from this NMEA log, at --at-time
     #[arg(long, value_name = "FILE")]
@@ -340,6 +342,47 @@ pub struct Export {
     pub at: String,
     #[command(flatten)]
     pub region: Region,
+}
+
+/// Arguments of `eval`.
+#[derive(Debug, Args)]
+pub struct Eval {
+    /// Captures with truth.json: directories of one each, or directories that hold such directories
+    #[arg(required = true)]
+    pub cases: Vec<PathBuf>,
+    /// Directory with SCENE/map.json and SCENE/SCENE.3ds or .glb, before "maps" in and beside CASES; may be given again
+    #[arg(long, value_name = "DIR")]
+    pub maps: Vec<PathBuf>,
+    /// A matcher with settings of its own, e.g. semantic:profile=paper,dice=1; "prior" is the phone's pose itself. May be
+    /// given again; default: prior, skyline, Dice, Jaccard and boundary F1 alone, the mean of the three, semantic
+    #[arg(long, value_name = "NAME[:KEY=VALUE,…]")]
+    pub matcher: Vec<String>,
+    /// Also detect, estimate and commit, on copies of the maps, and score the changes
+    #[arg(long)]
+    pub updates: bool,
+    /// Only captures whose directory begins with this
+    #[arg(long, value_name = "PREFIX")]
+    pub only: Option<String>,
+    /// At most this many captures
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub limit: Option<u64>,
+    /// Change detector
+    #[arg(long, default_value = "class-difference", requires = "updates")]
+    pub detector: String,
+    /// Descriptor estimator
+    #[arg(long, default_value = "descriptors", requires = "updates")]
+    pub estimator: String,
+    #[command(flatten)]
+    pub settings: Settings,
+    /// Seed of the bootstrap that the 95 % intervals come from
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Also print a row for each capture, as the paper's Table II has them
+    #[arg(long)]
+    pub table: bool,
+    /// Write a line for each capture and matcher
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
 }
 
 /// `plugins` subcommands.

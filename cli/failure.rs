@@ -2,6 +2,7 @@
 
 use resurvey_core::capture::CaptureError;
 use resurvey_core::crs::CrsError;
+use resurvey_core::evaluate::TruthError;
 use resurvey_core::export::ExportError;
 use resurvey_core::image::ImageError;
 use resurvey_core::localize::HeatMapError;
@@ -107,6 +108,7 @@ failure_from! {
     ClassMapError => INPUT,
     EncodingError => MAP,
     SettingsError => USAGE,
+    TruthError => INPUT,
     ChangeSetError => INPUT,
     InvalidBox => USAGE,
 }

@@ -12,7 +12,9 @@ mod tools;
 
 use args::{Cli, Command};
 use clap::Parser;
-use commands::{apply, evidence, export, fsck, generate, import, init, localize, log, plugins, query, render, update};
+use commands::{
+    apply, eval, evidence, export, fsck, generate, import, init, localize, log, plugins, query, render, update,
+};
 use console::Console;
 use failure::{Failure, USAGE};
 use std::ffi::OsString;
@@ -79,6 +81,7 @@ fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {
         Command::Why(options) => evidence::run(options, console),
         Command::Apply(options) => apply::run(options, console),
         Command::Export(options) => export::run(options, console),
+        Command::Eval(options) => eval::run(options, &cli.plugins, console),
         Command::Plugins(command) => plugins::run(command, &cli.plugins, console),
         Command::Fsck(options) => fsck::run(options, console),
         Command::Completions(options) => generate::completions(options, console),

@@ -116,7 +116,8 @@ fn move_between(imported: &mut Imported, crs: Crs, source: Crs) -> Result<(), Fa
     Ok(())
 }
 
-fn add_object(transaction: &mut UpdateTransaction, object: &Object) -> Result<(), Failure> {
+/// Adds `object` to what `transaction` brings.
+pub(super) fn add_object(transaction: &mut UpdateTransaction, object: &Object) -> Result<(), Failure> {
     let (low, high) = object.mesh.bounds();
     let bounds = BoxMm::new(low, high).map_err(Failure::input)?;
     let geometry = transaction.add_geometry(encode_mesh(&object.mesh));

@@ -1,6 +1,7 @@
 //! One module per command.
 
 pub mod apply;
+pub mod eval;
 pub mod evidence;
 pub mod export;
 pub mod fsck;
@@ -34,4 +35,20 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         return Err(Failure::input(text));
     }
     std::fs::write(path, bytes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+/// A CSV cell, quoted where it must be (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn names_with_commas_and_quotes_stay_one_cell() {
+        assert_eq!(quoted("tower \"A\", north"), "\"tower \"\"A\"\", north\"");
+        assert_eq!(quoted("tower"), "tower");
+    }
 }

@@ -1,6 +1,6 @@
 //! `resurvey query`.
 
-use super::crs_of;
+use super::{crs_of, quoted};
 use crate::args::{Query, QueryFormat};
 use crate::console::Console;
 use crate::document;
@@ -240,21 +240,5 @@ fn size(state: &FeatureState, classes: &ClassTable) -> String {
                 (high.easting_m - low.easting_m, high.northing_m - low.northing_m, high.height_m - low.height_m);
             format!("{e:.1} x {n:.1} x {h:.1}")
         }
-    }
-}
-
-/// A CSV cell, quoted where it must be (RFC 4180).
-fn quoted(text: &str) -> String {
-    if text.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn names_with_commas_and_quotes_stay_one_cell() {
-        assert_eq!(quoted("tower \"A\", north"), "\"tower \"\"A\"\", north\"");
-        assert_eq!(quoted("tower"), "tower");
     }
 }

@@ -1,7 +1,7 @@
 //! `resurvey update`: localize, detect, estimate, commit.
 
 use super::crs_of;
-use crate::args::{PluginSearch, Update};
+use crate::args::{PluginSearch, PriorFrom, Update};
 use crate::commands::localize::pose_text;
 use crate::console::{Console, Stage};
 use crate::document;
@@ -33,8 +33,14 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
     let mut documents = Vec::new();
     let mut code = Ok(NOTHING);
     for path in &options.captures {
-        let mut run = Run { map: &map, crs: crs_of(&map)?, options, timings: Map::new() };
-        match run.capture(path, given, &mut tools, console) {
+        let recording = Recording {
+            dry_run: options.dry_run,
+            keep_labels: options.keep_labels,
+            message: options.message.as_deref(),
+            author: &options.author,
+        };
+        let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new() };
+        match run.capture(path, (given, &options.prior), &mut tools, console) {
             Ok((document, of_capture)) => {
                 code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
                 documents.push(document);
@@ -77,9 +83,15 @@ fn refuse_one_for_several(options: &Update) -> Result<(), Failure> {
 struct Tools {
     choices: Choices,
     matcher: Matcher,
-    detector: Detector,
-    estimator: Estimator,
-    used: Vec<PluginUse>,
+    comparers: Comparers,
+}
+
+/// What finds and measures changes where the pose is known.
+pub(super) struct Comparers {
+    pub(super) detector: Detector,
+    pub(super) estimator: Estimator,
+    /// Every plugin of the run for the evidence, the matcher first.
+    pub(super) used: Vec<PluginUse>,
 }
 
 impl Tools {
@@ -91,56 +103,99 @@ impl Tools {
         let [matcher, detector, estimator] = [load(names[0])?, load(names[1])?, load(names[2])?];
         Ok(Self {
             matcher: matcher.plugin.matcher(&matcher.settings)?,
-            detector: detector.plugin.detector(&detector.settings)?,
-            estimator: estimator.plugin.estimator(&estimator.settings)?,
-            used: vec![matcher.used()?, detector.used()?, estimator.used()?],
+            comparers: Comparers {
+                detector: detector.plugin.detector(&detector.settings)?,
+                estimator: estimator.plugin.estimator(&estimator.settings)?,
+                used: vec![matcher.used()?, detector.used()?, estimator.used()?],
+            },
             choices,
         })
     }
 }
 
-struct Run<'a> {
-    map: &'a MapFile,
-    crs: Crs,
-    options: &'a Update,
-    timings: Map<String, Value>,
+/// One capture on one map.
+pub(super) struct Run<'a> {
+    pub(super) map: &'a MapFile,
+    pub(super) crs: Crs,
+    pub(super) recording: Recording<'a>,
+    /// Milliseconds of each stage.
+    pub(super) timings: Map<String, Value>,
 }
 
-/// What one capture came to, before it is committed.
-struct Outcome {
-    located: Located,
-    resolution: Resolution,
-    viewed_region: Option<BoxMm>,
+/// What the map keeps of a run, and who says so.
+#[derive(Clone, Copy)]
+pub(super) struct Recording<'a> {
+    pub(super) dry_run: bool,
+    pub(super) keep_labels: bool,
+    pub(super) message: Option<&'a str>,
+    pub(super) author: &'a str,
+}
+
+/// A capture that was read, and the map around it.
+pub(super) struct Work {
+    pub(super) base: VersionId,
+    pub(super) capture: Capture,
+    pub(super) world: World,
     /// The `prior` of the result.
-    prior: Value,
+    pub(super) prior: Value,
+}
+
+/// What one capture came to.
+pub(super) struct Outcome {
+    pub(super) located: Located,
+    pub(super) resolution: Resolution,
+    viewed_region: Option<BoxMm>,
 }
 
 impl Run<'_> {
     fn capture(
         &mut self,
         path: &Path,
-        given: Option<Pose>,
+        (given, prior): (Option<Pose>, &PriorFrom),
         tools: &mut Tools,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
+        let work = self.read(path, given, prior, console)?;
+        let located = self.locate(&work.world, &work.capture, given, tools, console)?;
+        let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
+        self.report(path, &work, &outcome, &committed, (tools.matcher.info(), &tools.comparers.used), console)
+    }
+
+    /// Reads the capture at `path` and the map around it.
+    pub(super) fn read(
+        &mut self,
+        path: &Path,
+        given: Option<Pose>,
+        prior: &PriorFrom,
+        console: &mut Console<'_>,
+    ) -> Result<Work, Failure> {
         let base = self.map.head()?;
         let snapshot = self.map.snapshot(base)?;
         let stage = console.stage("read");
-        let Placed { capture, world, prior } =
-            read_placed(path, &self.options.prior, given, (&snapshot, self.crs), console)?;
+        let Placed { capture, world, prior } = read_placed(path, prior, given, (&snapshot, self.crs), console)?;
         self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
-        let located = self.locate(&world, &capture, given, tools, console)?;
-        let matcher = tools.matcher.info().clone();
+        Ok(Work { base, capture, world, prior })
+    }
+
+    /// Finds what changed, where the pose is reliable, and commits it.
+    pub(super) fn conclude(
+        &mut self,
+        work: &Work,
+        located: Located,
+        is_given: bool,
+        comparers: &mut Comparers,
+        console: &mut Console<'_>,
+    ) -> Result<(Outcome, Committed), Failure> {
         let (resolution, viewed_region) = if located.is_reliable() {
-            self.compare(&world, &capture, &located, tools, console)?
+            self.compare(&work.world, &work.capture, &located, comparers, console)?
         } else {
             (Resolution::default(), None)
         };
-        let outcome = Outcome { located, resolution, viewed_region, prior };
+        let outcome = Outcome { located, resolution, viewed_region };
         let stage = console.stage("commit");
-        let committed = self.commit(base, &capture, given.is_some(), &outcome, tools)?;
+        let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
-        self.report(path, base, &outcome, &committed, (&matcher, &tools.used), console)
+        Ok((outcome, committed))
     }
 
     fn locate(
@@ -166,7 +221,7 @@ impl Run<'_> {
         world: &World,
         capture: &Capture,
         located: &Located,
-        tools: &mut Tools,
+        comparers: &mut Comparers,
         console: &mut Console<'_>,
     ) -> Result<(Resolution, Option<BoxMm>), Failure> {
         let mut time = |name: &'static str, console: &mut Console<'_>, stage: &Stage| {
@@ -180,11 +235,11 @@ impl Run<'_> {
         time("view", console, &stage);
         let stage = console.stage("detect");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let regions = comparison.detect(&mut tools.detector, &services)?;
+        let regions = comparison.detect(&mut comparers.detector, &services)?;
         time("detect", console, &stage);
         let stage = console.stage("estimate");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let proposals = comparison.estimate(&mut tools.estimator, &services, &regions)?;
+        let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions)?;
         time("estimate", console, &stage);
         let resolution = resolve(proposals, &regions, world.descriptors());
         Ok((resolution, comparison.viewed_region()))
@@ -197,24 +252,24 @@ impl Run<'_> {
         capture: &Capture,
         is_given: bool,
         outcome: &Outcome,
-        tools: &Tools,
+        used: &[PluginUse],
     ) -> Result<Committed, Failure> {
         let decision = match (outcome.located.is_reliable(), outcome.resolution.changes.is_empty()) {
             (false, _) => Decision::Unreliable,
             (true, true) => Decision::Nothing,
             (true, false) => Decision::Committed,
         };
-        if self.options.dry_run {
+        if self.recording.dry_run {
             return Ok(Committed { decision, version: None, fids: Vec::new() });
         }
-        let evidence = self.evidence(capture, is_given, outcome, tools, decision);
+        let evidence = self.evidence(capture, is_given, outcome, used, decision);
         let now = Timestamp::now();
         if decision != Decision::Committed {
             self.map.record_observation(base, &evidence, now)?;
             return Ok(Committed { decision, version: None, fids: Vec::new() });
         }
-        let message = self.options.message.clone().unwrap_or_else(|| message_of(&outcome.resolution.changes));
-        let mut transaction = UpdateTransaction::new(base, VersionKind::Update, &self.options.author, message);
+        let message = self.recording.message.map_or_else(|| message_of(&outcome.resolution.changes), ToOwned::to_owned);
+        let mut transaction = UpdateTransaction::new(base, VersionKind::Update, self.recording.author, message);
         transaction.observed_at = capture.taken_at;
         transaction.viewed_region = outcome.viewed_region;
         transaction.evidence = Some(evidence);
@@ -230,14 +285,14 @@ impl Run<'_> {
         capture: &Capture,
         is_given: bool,
         outcome: &Outcome,
-        tools: &Tools,
+        used: &[PluginUse],
         decision: Decision,
     ) -> Observation {
         let localization = &outcome.located.localization;
         Observation {
             capture: capture.digest,
             taken_at: capture.taken_at,
-            labels: self.options.keep_labels.then(|| capture.label_bytes.clone()),
+            labels: self.recording.keep_labels.then(|| capture.label_bytes.clone()),
             prior: Some(capture.prior),
             localization: Some(LocalizationEvidence {
                 pose: localization.pose,
@@ -246,7 +301,7 @@ impl Run<'_> {
                 runner_up: localization.runner_up,
                 candidates: localization.candidates,
             }),
-            plugins: tools.used.iter().skip(usize::from(is_given)).cloned().collect(),
+            plugins: used.iter().skip(usize::from(is_given)).cloned().collect(),
             gates: outcome.located.gates.clone(),
             rejections: outcome.resolution.rejections.clone(),
             decision,
@@ -256,13 +311,13 @@ impl Run<'_> {
     fn report(
         &self,
         path: &Path,
-        base: VersionId,
+        work: &Work,
         outcome: &Outcome,
         committed: &Committed,
         (matcher, used): (&PluginInfo, &[PluginUse]),
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
-        let snapshot = self.map.snapshot(base)?;
+        let snapshot = self.map.snapshot(work.base)?;
         let classes = snapshot.classes();
         let mut fids = committed.fids.iter().copied();
         let changes: Vec<Value> = (outcome.resolution.changes.iter())
@@ -274,16 +329,16 @@ impl Run<'_> {
         let (decision, code) = match committed.decision {
             Decision::Unreliable => ("unreliable", UNRELIABLE),
             Decision::Nothing => ("nothing", NOTHING),
-            _ if self.options.dry_run => ("dry-run", 0),
+            _ if self.recording.dry_run => ("dry-run", 0),
             _ => ("committed", 0),
         };
         let rejections = outcome.resolution.rejections.iter();
         let document = json!({
             "capture": path.display().to_string(),
-            "base_version": base.0,
+            "base_version": work.base.0,
             "version": committed.version.map(|version| version.0),
             "decision": decision,
-            "localization": document::located(&outcome.located, matcher, self.crs, (&outcome.prior, &self.timings)),
+            "localization": document::located(&outcome.located, matcher, self.crs, (&work.prior, &self.timings)),
             "changes": changes,
             "rejections": rejections.map(|rejection| document::rejection(rejection, classes)).collect::<Vec<_>>(),
             "plugins": used.iter().map(document::plugin_use).collect::<Vec<_>>(),
@@ -296,8 +351,9 @@ impl Run<'_> {
     }
 }
 
-struct Committed {
-    decision: Decision,
+/// What became of the changes.
+pub(super) struct Committed {
+    pub(super) decision: Decision,
     version: Option<VersionId>,
     fids: Vec<u64>,
 }
