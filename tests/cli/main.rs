@@ -8,6 +8,7 @@ mod answers;
 mod bench;
 mod captures;
 mod change_sets;
+mod evaluate;
 mod exports;
 mod generated;
 mod history;

@@ -8,7 +8,7 @@ use crate::commands::crs_of;
 use crate::commands::update::{Comparers, Outcome, Recording, Run, Work};
 use crate::console::{Console, Stage};
 use crate::failure::{Failure, INPUT};
-use crate::tools::Choices;
+use crate::tools::{Choices, Tool};
 use resurvey_core::capture::Capture;
 use resurvey_core::evaluate::{Answer, PoseError, Trial, nees, score_changes};
 use resurvey_core::localize::{Listener, Located, SceneServices, localize};
@@ -222,7 +222,7 @@ impl Trying<'_> {
         let mut comparers = Comparers {
             detector: detector.plugin.detector(&detector.settings)?,
             estimator: estimator.plugin.estimator(&estimator.settings)?,
-            used: tools.map(|tool| tool.used()).collect::<Result<_, _>>()?,
+            used: tools.map(Tool::used).collect::<Result<_, _>>()?,
         };
         let (outcome, _) = quietly(|console| run_on(map)?.conclude(work, located, false, &mut comparers, console))?;
         Ok(outcome)

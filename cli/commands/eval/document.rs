@@ -47,7 +47,7 @@ fn group(group: &Group, contenders: &[Contender]) -> Value {
         "by": group.by,
         "name": group.name,
         "summaries": names().zip(&group.summaries).map(summary).collect::<Vec<_>>(),
-        "above": names().last(),
+        "above": contenders.last().map(|contender| &contender.name),
         "differences": names().zip(&group.differences).map(difference).collect::<Vec<_>>(),
     })
 }

@@ -18,24 +18,24 @@ pub fn print(
 ) -> Result<(), Failure> {
     let contenders = &results.field.contenders;
     if is_by_capture {
-        titled("every capture (Table II of Lee & Hsu): position m / heading °", captures(results), console)?;
+        titled("every capture (Table II of Lee & Hsu): position m / heading °", &captures(results), console)?;
     }
     for group in groups.iter().filter(|group| is_worth_a_table(group, groups)) {
         let count = group.summaries.first().map_or(0, |summary| summary.captures);
         let what = if group.by == "all" { "all captures".to_owned() } else { format!("{} {}", group.by, group.name) };
-        titled(&format!("{what}: {count} captures"), accuracy(&group.summaries, contenders), console)?;
+        titled(&format!("{what}: {count}"), &accuracy(&group.summaries, contenders), console)?;
         if group.by == "all" {
-            titled("reliability", reliability(&group.summaries, contenders), console)?;
+            titled("reliability", &reliability(&group.summaries, contenders), console)?;
         }
         if results.with_updates {
-            titled(&format!("{what}: changes"), changes(&group.summaries, contenders), console)?;
+            titled(&format!("{what}: changes"), &changes(&group.summaries, contenders), console)?;
         }
         if group.by == "all"
             && let Some(reference) = contenders.last()
             && !group.differences.is_empty()
         {
             let title = format!("each against {} on the same captures", reference.name);
-            titled(&title, differences(&group.differences, contenders), console)?;
+            titled(&title, &differences(&group.differences, contenders), console)?;
         }
     }
     notes(results, console)?;
@@ -50,7 +50,7 @@ fn is_worth_a_table(group: &Group, groups: &[Group]) -> bool {
     group.by == "all" || groups.iter().filter(|other| other.by == group.by).count() > 1
 }
 
-fn titled(title: &str, table: Table, console: &mut Console<'_>) -> Result<(), Failure> {
+fn titled(title: &str, table: &Table, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(title)?;
     console.line(table.trim_fmt())?;
     console.line("")

@@ -273,7 +273,7 @@ mod tests {
         assert_eq!(of(&[added(BANNER, 2.1)]), (vec![false, false], 1));
         assert_eq!(of(&[added(ClassId(1), 0.0)]), (vec![false, false], 1));
         assert_eq!(of(&[added(BANNER, 0.1), added(BANNER, 0.0)]), (vec![true, false], 1));
-        assert_eq!(of(&[removed.clone()]), (vec![false, true], 0));
+        assert_eq!(of(std::slice::from_ref(&removed)), (vec![false, true], 0));
         assert_eq!(of(&[Change::Add(chair(10.0, 10.0))]), (vec![false, false], 1));
         assert_eq!(of(&[]), (vec![false, false], 0));
         let modified = Change::Modify { fid: 3, before: material(BANNER, 9.0, 0.0), after: material(BANNER, 3.0, 0.0) };
