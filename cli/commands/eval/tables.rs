@@ -32,8 +32,8 @@ pub fn accuracy(summaries: &[Summary], contenders: &[Contender]) -> Table {
             number(&summary.median_m),
             metres(summary.ninth_decile_m.value),
             number(&summary.median_deg),
-            summary.mean_m.map_or_else(dash, |mean| metres(mean.value)),
-            summary.mean_deg.map_or_else(dash, |mean| metres(mean.value)),
+            summary.mean_m.as_ref().map_or_else(dash, number),
+            summary.mean_deg.as_ref().map_or_else(dash, number),
             format!("{} of {}", summary.answered, summary.captures),
             format!("{:.1}", summary.median_seconds),
         ]);
