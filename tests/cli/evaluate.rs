@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const QUICK: &str = "semantic:radius_m=5,yaw_range_deg=8,modes=4";
 
 /// Two captures: the street's new banner, and a hall that lost a chair the map knew.
-fn suite() -> &'static Path {
+pub fn suite() -> &'static Path {
     static SUITE: OnceLock<PathBuf> = OnceLock::new();
     SUITE.get_or_init(|| {
         let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("evaluate");
@@ -256,6 +256,12 @@ fn a_suite_that_is_none_is_refused_by_name_before_anything_runs() {
 #[test]
 fn matchers_and_settings_that_cannot_be_are_refused_with_what_can() {
     let refused = |words: &[&str], code: u8, expected: &[&str]| eval(suite(), words).refused(code, expected);
+    let twins = eval(suite(), &["--only", "hall", "--matcher", "skyline", "--matcher", "skyline:sky_class=6"]).ok();
+    assert!(
+        twins.err.contains("skyline and skyline:sky_class=6 are one plugin with the same settings"),
+        "{}",
+        twins.err
+    );
     refused(&["--matcher", "magic"], 11, &["magic", "semantic, skyline"]);
     refused(&["--updates", "--detector", "magic"], 11, &["magic", "class-difference"]);
     refused(&["--matcher", "descriptors"], 12, &["descriptors", "matcher"]);

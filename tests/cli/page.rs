@@ -1,6 +1,7 @@
 //! `docs/cli.md` names all that the program has.
 
 use crate::bench::{Bench, resurvey, street, text};
+use crate::evaluate::suite;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -91,6 +92,10 @@ fn the_page_names_every_key_of_every_document() {
         resurvey(&["plugins", "list", "--json"]).ok().json(),
         resurvey(&["plugins", "info", "semantic", "--json"]).ok().json(),
         resurvey(&["man", text(&bench.path("man")), "--json"]).ok().json(),
+        // One matcher against itself has every key of a comparison.
+        resurvey(&["eval", text(suite()), "--matcher", "prior", "--matcher", "prior", "--updates", "--json"])
+            .ok()
+            .json(),
     ];
     let mut found = BTreeSet::new();
     documents.iter().for_each(|document| keys(document, &mut found));
@@ -102,7 +107,8 @@ fn the_page_names_every_key_of_every_document() {
 
 #[test]
 fn the_help_of_every_command_says_what_changes() {
-    for command in ["init", "import", "localize", "render", "update", "query", "log", "why", "apply", "export", "fsck"]
+    for command in
+        ["init", "import", "localize", "render", "update", "query", "log", "why", "apply", "export", "eval", "fsck"]
     {
         let help = resurvey(&[command, "--help"]).ok().out;
         let first = help.lines().next().unwrap();

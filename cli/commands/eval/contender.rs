@@ -3,7 +3,7 @@
 use crate::args::{Eval, PluginSearch, Settings};
 use crate::failure::Failure;
 use crate::tools::{Choices, Tool, load, registry};
-use resurvey_core::plugin::Registry;
+use resurvey_core::plugin::{Digest, Registry};
 
 /// The phone's pose as the answer.
 const PRIOR: &str = "prior";
@@ -27,6 +27,12 @@ pub struct Contender {
     pub specification: String,
     /// The plugin; `None` for the prior.
     pub matcher: Option<Tool>,
+}
+
+impl Contender {
+    fn identity(&self) -> Option<(&str, Digest)> {
+        self.matcher.as_ref().map(|tool| (tool.plugin.info().name.as_str(), tool.settings.sha256()))
+    }
 }
 
 /// The plugins of a run, and the limits of its gate.
@@ -60,6 +66,17 @@ impl Field {
         others[0].plugin.detector(&others[0].settings)?;
         others[1].plugin.estimator(&others[1].settings)?;
         Ok(Self { contenders, others, settings, names })
+    }
+
+    /// Pairs of contenders that are the same plugin with the same complete settings, and so give the same answers.
+    pub fn twins(&self) -> Vec<[&str; 2]> {
+        let pairs = self
+            .contenders
+            .iter()
+            .enumerate()
+            .flat_map(|(index, contender)| self.contenders[..index].iter().map(move |before| (before, contender)));
+        let same = pairs.filter(|(before, contender)| before.identity() == contender.identity());
+        same.map(|(before, contender)| [before.name.as_str(), contender.name.as_str()]).collect()
     }
 
     /// Limits of gate and search, and the settings of detector and estimator.

@@ -29,6 +29,9 @@ pub struct Results<'a> {
 /// Compares matchers on captures with truth.
 pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     let field = Field::load(options, plugins)?;
+    for [one, other] in field.twins() {
+        console.message(&format!("warning: {one} and {other} are one plugin with the same settings"));
+    }
     let cases = cases::find(options)?;
     let mut maps = Maps::new()?;
     // Whatever is wrong with a file is said before hours are spent on the others.

@@ -149,7 +149,9 @@ pub fn captures(results: &Results<'_>) -> Table {
 }
 
 fn pose(error: &PoseError) -> String {
-    format!("{:.2} / {:.1}", error.position_m(), error.yaw_deg())
+    // Zero is added so that a rounded −0 has no sign.
+    let yaw_deg = (10.0 * error.yaw_deg()).round() / 10.0 + 0.0;
+    format!("{:.2} / {yaw_deg:.1}", error.position_m())
 }
 
 /// Mean of the distances and of the absolute headings, over those that there are.
