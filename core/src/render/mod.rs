@@ -4,6 +4,7 @@
 mod clip;
 mod edges;
 mod frame;
+mod hierarchy;
 pub mod lidar;
 mod occlusion;
 pub mod panorama;
@@ -21,6 +22,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
+pub use hierarchy::{Bounds, Hierarchy};
 pub use raster::Renderer;
 pub use rays::{Hit, Nearest, RayCaster};
 pub use scene::{Cluster, Scene, SceneObject};

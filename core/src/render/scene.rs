@@ -1,6 +1,7 @@
 //! The triangles of the map around a local origin: what the rasteriser and the rays see.
 
 use super::clip::{Corner, within_reach};
+use super::hierarchy::Hierarchy;
 use super::plate;
 use crate::crs::{LOCAL_LIMIT_M, LocalOrigin};
 use crate::mesh::{Mesh, Object, Surface};
@@ -26,6 +27,7 @@ pub struct Scene {
     features: Vec<u32>,
     surfaces: Vec<Surface>,
     clusters: Vec<Cluster>,
+    hierarchy: Hierarchy,
     objects: Vec<SceneObject>,
     feature_table: Vec<ViewFeature>,
     sky: ClassId,
@@ -70,6 +72,7 @@ impl Scene {
             features: Vec::new(),
             surfaces: Vec::new(),
             clusters: Vec::new(),
+            hierarchy: Hierarchy::default(),
             objects: Vec::new(),
             feature_table: Vec::new(),
             sky: classes.by_name("sky").map_or(ClassId::VOID, |class| class.index),
@@ -80,6 +83,7 @@ impl Scene {
         for (fid, descriptor) in descriptors {
             scene.add_descriptor(*fid, descriptor);
         }
+        scene.hierarchy = Hierarchy::new(&scene.clusters);
         scene
     }
 
@@ -148,6 +152,11 @@ impl Scene {
     /// Boxes around consecutive triangles; together they hold every triangle once, in order.
     pub fn clusters(&self) -> &[Cluster] {
         &self.clusters
+    }
+
+    /// The hierarchy of boxes over the clusters.
+    pub fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
     }
 
     /// The objects of the base map.
