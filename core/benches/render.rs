@@ -50,7 +50,7 @@ fn labels(scene: &Scene, camera: &Pinhole, pose: &Pose) -> (f64, f64, usize) {
     let mut renderer = Renderer::new();
     let mut image = LabelImage::filled(camera.width(), camera.height(), 0);
     let whole = median(|| renderer.render_labels(scene, camera, pose, black_box(&mut image)));
-    let visible = renderer.visible_triangles();
+    let visible = renderer.visible_triangles(scene, camera, pose);
     let culled = median(|| renderer.render_labels_of((scene, &visible), camera, pose, black_box(&mut image)));
     (whole, culled, visible.len())
 }

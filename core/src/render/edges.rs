@@ -1,110 +1,137 @@
-//! The half planes whose intersection a triangle covers, row by row.
+//! The half planes whose intersection a triangle covers, a few rows at a time.
 
-use nalgebra::Vector3;
-use std::ops::Range;
-
+/// Rows worked on at once.
+pub(super) const ROWS: usize = 8;
 /// Bounds on a row that a triangle has at most: three edges and the near plane.
 const MOST: usize = 4;
 
 /// Half planes of (u, v), sorted into bounds on u from either side and bounds on v.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edges {
-    first_row: usize,
-    end_row: usize,
+    /// Bounds on u as slope · v + constant: those from the left from the front, those from the right from the back.
+    lines: [(f64, f64); MOST],
+    left: u8,
+    right: u8,
     width: f64,
-    left: Bounds,
-    right: Bounds,
     /// Bounds on v of edges that run along rows: first inside, first outside.
     top: f64,
     bottom: f64,
 }
 
-/// Bounds on u as slope · v + constant.
+/// Columns `first..end` of some rows whose centres are covered.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
-    lines: [(f64, f64); MOST],
-    count: usize,
+pub(super) struct Columns {
+    pub(super) first: [i32; ROWS],
+    pub(super) end: [i32; ROWS],
 }
 
 impl Edges {
-    /// The whole of `rows`, `width` pixels wide.
-    pub(super) fn new(rows: Range<usize>, width: f64) -> Self {
-        let none = |constant| Bounds { lines: [(0.0, constant); MOST], count: 0 };
-        Self {
-            first_row: rows.start,
-            end_row: rows.end,
-            width,
-            left: none(0.0),
-            right: none(width),
-            top: f64::NEG_INFINITY,
-            bottom: f64::INFINITY,
-        }
+    /// The whole of an image `width` pixels wide.
+    #[inline(always)]
+    pub(super) fn new(width: f64) -> Self {
+        // Two bounds a side are the rule, and unused ones are the border of the image.
+        let lines = [(0.0, 0.0), (0.0, 0.0), (0.0, width), (0.0, width)];
+        Self { lines, left: 0, right: 0, width, top: f64::NEG_INFINITY, bottom: f64::INFINITY }
     }
 
-    /// Keeps the pixels whose centre gives `form` · (u, v, 1) > 0, and of those with 0 the ones on a top or left edge.
-    pub(super) fn add(&mut self, form: Vector3<f64>) {
-        let line = || (-form.y / form.x, -form.z / form.x);
-        if form.x > 0.0 {
-            self.left.add(line());
-        } else if form.x < 0.0 {
-            self.right.add(line());
-        } else if form.y > 0.0 {
-            self.top = larger(self.top, -form.z / form.y);
-        } else if form.y < 0.0 {
-            self.bottom = smaller(self.bottom, -form.z / form.y);
-        } else if form.z <= 0.0 {
+    /// Keeps the pixels whose centre gives `form` · (u, v, 1) > 0, and of those with 0 the ones on a top or left edge;
+    /// `line` is (−y/x, −z/x) of the form.
+    #[inline(always)]
+    pub(super) fn add(&mut self, [x, y, z]: [f64; 3], line: (f64, f64)) {
+        if x > 0.0 {
+            self.lines[usize::from(self.left) % MOST] = line;
+            self.left += 1;
+        } else if x < 0.0 {
+            self.lines[(MOST - 1 - usize::from(self.right)) % MOST] = line;
+            self.right += 1;
+        } else if y > 0.0 {
+            self.top = larger(self.top, -z / y);
+        } else if y < 0.0 {
+            self.bottom = smaller(self.bottom, -z / y);
+        } else if z <= 0.0 {
             self.bottom = f64::NEG_INFINITY;
         }
     }
 
-    pub(super) fn rows(&self) -> Range<usize> {
-        self.first_row..self.end_row
-    }
-
-    /// Columns `first..end` whose centres are covered in the row with centre `y`.
-    #[inline]
-    pub(super) fn columns(&self, y: f64) -> (usize, usize) {
-        if y < self.top || y >= self.bottom {
-            return (0, 0);
+    /// Columns of the rows from `first_row` on.
+    #[inline(always)]
+    pub(super) fn columns(&self, first_row: i32) -> Columns {
+        let mut columns = Columns { first: [0; ROWS], end: [0; ROWS] };
+        let (mut lefts, mut rights) = ([0.0; ROWS], [0.0; ROWS]);
+        let first_y = f64::from(first_row) + 0.5;
+        if self.left <= 2 && self.right <= 2 {
+            let [a, b, c, d] = self.lines;
+            for row in 0..ROWS {
+                let y = first_y + row as f64;
+                lefts[row] = larger(at(a, y), at(b, y));
+                rights[row] = smaller(at(c, y), at(d, y));
+            }
+        } else {
+            for row in 0..ROWS {
+                let y = first_y + row as f64;
+                let (left, right) = (usize::from(self.left), MOST - usize::from(self.right));
+                lefts[row] = self.lines[..left].iter().fold(0.0, |most, line| larger(most, at(*line, y)));
+                rights[row] = self.lines[right..].iter().fold(self.width, |least, line| smaller(least, at(*line, y)));
+            }
         }
-        // Two bounds a side are the rule, and unused ones are the border of the image.
-        let left = larger(self.left.at(0, y), self.left.at(1, y));
-        let right = smaller(self.right.at(0, y), self.right.at(1, y));
-        let left = (2..self.left.count).fold(left, |left, index| larger(left, self.left.at(index, y)));
-        let right = (2..self.right.count).fold(right, |right, index| smaller(right, self.right.at(index, y)));
-        (first_centre(left, self.width), first_centre(right, self.width))
+        for row in 0..ROWS {
+            let y = first_y + row as f64;
+            let covered = (y >= self.top) & (y < self.bottom);
+            columns.first[row] = first_centre(lefts[row], self.width);
+            columns.end[row] = if covered { first_centre(rights[row], self.width) } else { 0 };
+        }
+        columns
     }
 }
 
-impl Bounds {
-    fn add(&mut self, line: (f64, f64)) {
-        if self.count < MOST {
-            self.lines[self.count] = line;
-            self.count += 1;
-        }
-    }
-
-    fn at(&self, index: usize, y: f64) -> f64 {
-        let (slope, constant) = self.lines[index];
-        slope * y + constant
-    }
+#[inline(always)]
+fn at((slope, constant): (f64, f64), y: f64) -> f64 {
+    slope * y + constant
 }
 
-/// Index of the first pixel whose centre is not before `position`, 0…`size`.
-#[inline]
-pub(super) fn first_centre(position: f64, size: f64) -> usize {
-    // ceil(position − 0.5) without a call to ceil: truncation is floor for what is not negative.
-    let from_end = size + 0.5 - smaller(larger(position, 0.0), size);
-    (size as i32 - (from_end as i32).min(size as i32)) as usize
+/// Index of the first pixel whose centre is not before `position`, 0…`size`; 0 for NaN.
+#[inline(always)]
+pub(super) fn first_centre(position: f64, size: f64) -> i32 {
+    /// From here on floats are whole numbers, which are then in their low bits.
+    const WHOLE: f64 = (1_u64 << 52) as f64;
+    let position = smaller(larger(position, 0.0), size);
+    let nearest = (position + WHOLE) - WHOLE;
+    // The nearest whole number is the right one, but half-way between two it may be the upper.
+    let first = nearest - if nearest - position >= 0.5 { 1.0 } else { 0.0 };
+    (first + WHOLE).to_bits() as i32
 }
 
 // `f64::max` and `f64::min` take a detour for NaN, which cannot change a result here.
-#[inline]
+#[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-#[inline]
+#[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_centre;
+
+    #[test]
+    fn a_pixel_belongs_to_the_right_of_a_position_from_its_centre_on() {
+        for (position, first) in [
+            (-3.0, 0),
+            (0.0, 0),
+            (0.5, 0),
+            (0.500_001, 1),
+            (1.5, 1),
+            (1.500_001, 2),
+            (2.5, 2),
+            (7.2, 7),
+            (9.9, 10),
+            (99.0, 10),
+            (f64::NAN, 0),
+        ] {
+            assert_eq!(first_centre(position, 10.0), first, "{position}");
+        }
+    }
 }

@@ -1,12 +1,14 @@
 //! The map as seen from a pose: a scene of triangles in local coordinates, a rasteriser for images and rays for single
 //! queries.
 
+mod band;
 mod clip;
+mod code;
 mod edges;
-mod frame;
 mod hierarchy;
 pub mod lidar;
 mod occlusion;
+mod painter;
 pub mod panorama;
 mod plate;
 mod projection;
@@ -14,6 +16,8 @@ mod raster;
 mod rays;
 mod scene;
 mod setup;
+mod shade;
+mod shown;
 mod solid;
 mod texels;
 mod texture;

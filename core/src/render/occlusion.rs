@@ -1,20 +1,25 @@
-//! Which clusters what is already drawn hides (a two-level z-buffer after Greene, Kass & Miller 1993).
+//! What is already drawn hides (a two-level z-buffer after Greene, Kass & Miller 1993).
 
-use super::frame::Frame;
-use super::projection::{NEAR_M, Projection};
-use super::scene::Cluster;
-use nalgebra::Vector3;
+use super::band::{Band, LANES};
 
 /// Sides of a tile, pixels.
-const TILE: usize = 8;
+pub(super) const TILE: usize = 8;
+/// Tiles beside each other in a block of pixels.
+const ABREAST: usize = LANES / TILE;
 
-/// The smallest inverse depth in each tile of the image, at the time it was taken.
+/// Inverse depths drawn are off by a few roundings to f32; a share far above that keeps answers certain.
+const CERTAIN: f32 = 1e-5;
+
+/// The smallest inverse depth in each tile of a band, at the time it was taken.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Occlusion {
+    first_row: usize,
+    /// Tiles of a row.
     columns: usize,
+    /// Number of rows and columns of pixels.
+    rows: usize,
+    width: usize,
     farthest: Vec<f32>,
-    /// Smallest inverse depths over columns of a row of tiles.
-    band: Vec<f32>,
 }
 
 impl Occlusion {
@@ -24,50 +29,52 @@ impl Occlusion {
     }
 
     /// Takes what is drawn so far.
-    pub(super) fn take(&mut self, frame: &Frame) {
-        let width = frame.width();
-        self.columns = width.div_ceil(TILE);
+    #[inline(always)]
+    pub(super) fn take(&mut self, band: &Band) {
+        (self.first_row, self.rows, self.width) = (band.first_row(), band.rows(), band.width());
+        self.columns = band.width().div_ceil(LANES) * ABREAST;
         self.farthest.clear();
-        for first in (0..frame.height()).step_by(TILE) {
-            self.band.clear();
-            self.band.extend_from_slice(frame.inverse_depths(first));
-            for v in first + 1..(first + TILE).min(frame.height()) {
-                for (least, inverse_depth) in self.band.iter_mut().zip(frame.inverse_depths(v)) {
-                    *least = if *inverse_depth < *least { *inverse_depth } else { *least };
+        for first in (0..band.rows()).step_by(TILE) {
+            let last = (first + TILE).min(band.rows()) - 1;
+            for block in 0..band.row(first).len() {
+                let mut least = band.row(first)[block].inverse_depths;
+                for row in first + 1..=last {
+                    let here = &band.row(row)[block].inverse_depths;
+                    for lane in 0..LANES {
+                        least[lane] = smaller(here[lane], least[lane]);
+                    }
+                }
+                for tile in least.chunks_exact(TILE) {
+                    let halves: [f32; 4] = std::array::from_fn(|lane| smaller(tile[lane], tile[lane + 4]));
+                    self.farthest.push(smaller(smaller(halves[0], halves[2]), smaller(halves[1], halves[3])));
                 }
             }
-            self.farthest.extend(self.band.chunks(TILE).map(|tile| tile.iter().copied().fold(f32::INFINITY, f32::min)));
         }
     }
 
-    /// Whether all of the box is behind what was taken, for certain.
-    pub(super) fn hides(&self, projection: &Projection, cluster: &Cluster) -> bool {
+    /// Whether what lies between these columns and rows (of pixels of the image, first and end) and is no nearer than
+    /// an inverse depth is behind what was taken, for certain.
+    #[inline(always)]
+    pub(super) fn hides(&self, columns: [i32; 2], rows: [i32; 2], nearest: f32) -> bool {
         if self.farthest.is_empty() {
             return false;
         }
-        let mut low = Vector3::repeat(f64::INFINITY);
-        let mut high = Vector3::repeat(f64::NEG_INFINITY);
-        for corner in 0..8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { cluster.min[axis] } else { cluster.max[axis] };
-            let seen = projection.project([pick(0), pick(1), pick(2)]);
-            if seen.z < NEAR_M {
-                return false;
-            }
-            let pixel = Vector3::new(seen.x / seen.z, seen.y / seen.z, seen.z);
-            low = low.inf(&pixel);
-            high = high.sup(&pixel);
-        }
-        // What is drawn is rounded to f32; a share far above that keeps the answer certain.
-        let nearest = (1.0 / low.z * (1.0 + 1e-5)) as f32;
-        let tile = |position: f64, size: f64| held(position, size - 1.0) as usize / TILE;
-        let columns = tile(low.x - 1.0, projection.width)..=tile(high.x + 1.0, projection.width);
-        (tile(low.y - 1.0, projection.height)..=tile(high.y + 1.0, projection.height)).all(|row| {
-            let tiles = &self.farthest[row * self.columns..(row + 1) * self.columns];
-            tiles[columns.clone()].iter().all(|farthest| *farthest > nearest)
+        let nearest = nearest * (1.0 + CERTAIN);
+        let tiles = |first: i32, end: i32, size: usize| {
+            let held = |pixel: i32| (pixel.max(0) as usize).min(size - 1) / TILE;
+            held(first)..held(end - 1) + 1
+        };
+        let start = self.first_row as i32;
+        let (columns, rows) =
+            (tiles(columns[0], columns[1], self.width), tiles(rows[0] - start, rows[1] - start, self.rows));
+        rows.into_iter().all(|row| {
+            let row = &self.farthest[row * self.columns..(row + 1) * self.columns];
+            row.get(columns.clone()).is_some_and(|tiles| tiles.iter().all(|farthest| *farthest > nearest))
         })
     }
 }
 
-fn held(position: f64, last: f64) -> f64 {
-    position.max(0.0).min(last)
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }

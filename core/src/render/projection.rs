@@ -1,32 +1,41 @@
 //! From the scene's offsets to homogeneous pixels.
 
-use super::edges::first_centre;
-use super::scene::{Cluster, Scene};
+use super::hierarchy::Bounds;
+use super::scene::Scene;
 use crate::camera::{Pinhole, camera_from_world, world_from_camera};
 use nalgebra::{Matrix3, Vector3};
 use resurvey_schema::Pose;
-use std::ops::Range;
 
 /// Least depth drawn, metres.
 pub(super) const NEAR_M: f64 = 0.05;
 
 /// Slack of the box around a triangle, pixels; its edges decide.
-const SLACK_PX: f64 = 1e-3;
+pub(super) const SLACK_PX: f64 = 1e-3;
 
 /// A camera at a pose in a scene.
 #[derive(Clone, Debug)]
 pub(super) struct Projection {
-    /// Takes offsets from `centre` to (u·z, v·z, z).
-    pixels_from_scene: Matrix3<f64>,
+    /// Takes offsets from `centre` to (u·z, v·z, z); rows.
+    pixels_from_scene: [[f64; 3]; 3],
     /// Takes (u, v, 1) to the direction, E, N, H, whose depth is 1.
     pub(super) scene_from_pixels: Matrix3<f64>,
     /// The camera, offset from the scene's origin.
     pub(super) centre: Vector3<f64>,
     pub(super) width: f64,
     pub(super) height: f64,
-    /// Rows are the linear forms that are positive inside: left, right, top, bottom; offsets from `centre`.
-    sides: [Vector3<f64>; 4],
-    forward: Vector3<f64>,
+    /// Linear forms that are positive inside: left, right, top, bottom; offsets from `centre`.
+    sides: [[f64; 3]; 4],
+}
+
+/// Where a box is seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Seen {
+    /// Nowhere in the image.
+    Outside,
+    /// Some of it passes the camera: it may be anywhere.
+    Anywhere,
+    /// Between these columns and rows, first and end, and no nearer than this inverse depth.
+    Within { columns: [i32; 2], rows: [i32; 2], nearest: f32 },
 }
 
 impl Projection {
@@ -35,49 +44,86 @@ impl Projection {
         let [u, v, z] = [0, 1, 2].map(|row| pixels_from_scene.row(row).transpose());
         let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
         Self {
-            pixels_from_scene,
+            pixels_from_scene: [u, v, z].map(Into::into),
             scene_from_pixels: world_from_camera(pose).matrix() * camera.inverse(),
             centre: Vector3::from(scene.offset(pose.position)),
             width,
             height,
-            sides: [u, z * width - u, v, z * height - v],
-            forward: z,
+            sides: [u, z * width - u, v, z * height - v].map(Into::into),
         }
     }
 
-    /// (u·z, v·z, z) of a corner.
-    pub(super) fn project(&self, corner: [f32; 3]) -> Vector3<f64> {
-        self.pixels_from_scene * (Vector3::from(corner.map(f64::from)) - self.centre)
+    /// The camera, rounded offset from the scene's origin.
+    pub(super) fn eye(&self) -> [f32; 3] {
+        [self.centre.x as f32, self.centre.y as f32, self.centre.z as f32]
     }
 
-    /// Rows that the triangle may cover; empty when it covers no pixel centre.
-    pub(super) fn rows(&self, corners: &[Vector3<f64>; 3]) -> Range<usize> {
-        if corners.iter().any(|corner| corner.z < NEAR_M) {
-            return 0..self.height as usize;
+    /// (u·z, v·z, z) of an offset from the scene's origin.
+    #[inline(always)]
+    pub(super) fn pixel(&self, [east, north, up]: [f64; 3]) -> [f64; 3] {
+        let (east, north, up) = (east - self.centre.x, north - self.centre.y, up - self.centre.z);
+        let [u, v, z] = &self.pixels_from_scene;
+        let form = |row: &[f64; 3]| row[0] * east + row[1] * north + row[2] * up;
+        [form(u), form(v), form(z)]
+    }
+
+    /// Where `bounds` is seen.
+    #[inline(always)]
+    pub(super) fn see(&self, bounds: &Bounds) -> Seen {
+        let centre = [self.centre.x, self.centre.y, self.centre.z];
+        let low: [f64; 3] = std::array::from_fn(|axis| f64::from(bounds.min[axis]) - centre[axis]);
+        let high: [f64; 3] = std::array::from_fn(|axis| f64::from(bounds.max[axis]) - centre[axis]);
+        let mut corners = [[0.0; 8]; 3];
+        for (row, corners) in self.pixels_from_scene.iter().zip(&mut corners) {
+            for (corner, value) in corners.iter_mut().enumerate() {
+                let pick = |axis: usize| row[axis] * if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+                *value = pick(0) + pick(1) + pick(2);
+            }
         }
-        let [a, b, c] = corners.map(|corner| corner.xy() / corner.z);
-        let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-        let between =
-            |low: f64, high: f64, size: f64| first_centre(low - SLACK_PX, size)..first_centre(high + SLACK_PX, size);
-        if between(low.x, high.x, self.width).is_empty() { 0..0 } else { between(low.y, high.y, self.height) }
+        let [u, v, z] = &corners;
+        if largest(z) < NEAR_M {
+            return Seen::Outside;
+        }
+        let least_z = smallest(z);
+        if least_z < NEAR_M {
+            return if self.sides.iter().any(|side| reach(side, &low, &high) < 0.0) {
+                Seen::Outside
+            } else {
+                Seen::Anywhere
+            };
+        }
+        let (mut columns, mut rows) = ([0.0; 8], [0.0; 8]);
+        for corner in 0..8 {
+            columns[corner] = u[corner] / z[corner];
+            rows[corner] = v[corner] / z[corner];
+        }
+        let (columns, rows) = ([smallest(&columns), largest(&columns)], [smallest(&rows), largest(&rows)]);
+        let misses = |[low, high]: [f64; 2], size: f64| high < -1.0 || low > size + 1.0;
+        if misses(columns, self.width) || misses(rows, self.height) {
+            return Seen::Outside;
+        }
+        // What is inside or near the image fits an i32, and anything else may be cut off.
+        let range = |[low, high]: [f64; 2]| [low as i32 - 1, (high + 2.0) as i32];
+        Seen::Within { columns: range(columns), rows: range(rows), nearest: (1.0 / least_z) as f32 }
     }
+}
 
-    /// Whether some point of the triangle may be inside the image: not all corners lie beyond the same side.
-    pub(super) fn may_see_triangle(&self, corners: &[Vector3<f64>; 3]) -> bool {
-        let outside = |beyond: fn(&Self, &Vector3<f64>) -> bool| corners.iter().all(|corner| beyond(self, corner));
-        !(outside(|_, corner| corner.z < NEAR_M)
-            || outside(|_, corner| corner.x < 0.0)
-            || outside(|_, corner| corner.y < 0.0)
-            || outside(|view, corner| corner.x > view.width * corner.z)
-            || outside(|view, corner| corner.y > view.height * corner.z))
-    }
+/// The largest value of a linear form in a box.
+#[inline(always)]
+fn reach(form: &[f64; 3], low: &[f64; 3], high: &[f64; 3]) -> f64 {
+    (0..3).map(|axis| (form[axis] * low[axis]).max(form[axis] * high[axis])).sum()
+}
 
-    /// Depth of the nearest point of a cluster's box, metres; `None` when all of it is outside the image.
-    pub(super) fn nearest_depth_m(&self, cluster: &Cluster) -> Option<f64> {
-        let low = Vector3::from(cluster.min.map(f64::from)) - self.centre;
-        let high = Vector3::from(cluster.max.map(f64::from)) - self.centre;
-        let largest = |form: &Vector3<f64>| form.component_mul(&low).sup(&form.component_mul(&high)).sum();
-        let may_show = largest(&self.forward) >= NEAR_M && self.sides.iter().all(|side| largest(side) >= 0.0);
-        may_show.then(|| -largest(&-self.forward))
-    }
+#[inline(always)]
+fn smallest(values: &[f64; 8]) -> f64 {
+    let smaller = |a: f64, b: f64| if a < b { a } else { b };
+    let halves: [f64; 4] = std::array::from_fn(|k| smaller(values[k], values[k + 4]));
+    smaller(smaller(halves[0], halves[2]), smaller(halves[1], halves[3]))
+}
+
+#[inline(always)]
+fn largest(values: &[f64; 8]) -> f64 {
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    let halves: [f64; 4] = std::array::from_fn(|k| larger(values[k], values[k + 4]));
+    larger(larger(halves[0], halves[2]), larger(halves[1], halves[3]))
 }

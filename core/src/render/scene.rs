@@ -1,6 +1,7 @@
 //! The triangles of the map around a local origin: what the rasteriser and the rays see.
 
 use super::clip::{Corner, within_reach};
+use super::code::{Code, MOST_TRIANGLES};
 use super::hierarchy::Hierarchy;
 use super::plate;
 use crate::crs::{LOCAL_LIMIT_M, LocalOrigin};
@@ -24,6 +25,7 @@ pub struct Scene {
     positions: Vec<[[f32; 3]; 3]>,
     uvs: Vec<[[f32; 2]; 3]>,
     surface_indices: Vec<u32>,
+    codes: Vec<Code>,
     features: Vec<u32>,
     surfaces: Vec<Surface>,
     clusters: Vec<Cluster>,
@@ -56,6 +58,7 @@ pub struct Cluster {
 impl Scene {
     /// A scene around `origin`, which should lie near the cameras: what is more than 2048 m from it along an axis is cut
     /// off, and offsets are exact to 0.12 mm.
+    /// Triangles beyond 268 million are left out.
     /// Descriptors appear in the feature table in the order given, and later ones lie on top of earlier ones; without
     /// descriptors it is the base map alone. Sky is the class of that name in `classes`, void where there is none.
     pub fn new(
@@ -69,6 +72,7 @@ impl Scene {
             positions: Vec::new(),
             uvs: Vec::new(),
             surface_indices: Vec::new(),
+            codes: Vec::new(),
             features: Vec::new(),
             surfaces: Vec::new(),
             clusters: Vec::new(),
@@ -105,6 +109,11 @@ impl Scene {
     /// What `triangle` is made of; panics outside.
     pub fn surface(&self, triangle: usize) -> &Surface {
         &self.surfaces[self.surface_indices[triangle] as usize]
+    }
+
+    /// Codes of the triangles.
+    pub(super) fn codes(&self) -> &[Code] {
+        &self.codes
     }
 
     /// Class of `triangle` at texture coordinates `uv`; panics outside the triangles.
@@ -229,6 +238,10 @@ impl Scene {
         // Fails for an origin that is not finite, around which there is nothing.
         let Ok(origin) = LocalOrigin::new(self.origin) else { return };
         let [Ok(a), Ok(b), Ok(c)] = corners.map(|corner| origin.to_local(origin.at(corner.offset))) else { return };
+        if self.positions.len() >= MOST_TRIANGLES {
+            return;
+        }
+        self.codes.push(Code::of_triangle(self.positions.len(), &self.surfaces[surface as usize]));
         self.positions.push([a, b, c]);
         self.uvs.push(corners.map(|corner| corner.uv.map(|value| value as f32)));
         self.surface_indices.push(surface);

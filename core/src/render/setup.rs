@@ -1,9 +1,15 @@
 //! What a triangle needs to be drawn: its edges and its inverse depth as linear functions of the pixel (Olano & Greer
 //! 1997).
 
-use super::edges::Edges;
-use super::projection::{NEAR_M, Projection};
+use super::code::Code;
+use super::edges::{Edges, first_centre};
+use super::projection::{NEAR_M, Projection, SLACK_PX};
+use super::scene::Scene;
 use nalgebra::Vector3;
+use std::ops::Range;
+
+/// Triangles worked on at once.
+pub(super) const TOGETHER: usize = 8;
 
 /// Below this share of the product of its corners' distances the volume between camera and triangle is rounding: the
 /// triangle is degenerate or seen edge-on.
@@ -12,25 +18,161 @@ const FLAT: f64 = 1e-14;
 /// A triangle that may show.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setup {
-    /// Index in the scene.
-    pub(super) triangle: u32,
+    pub(super) code: Code,
+    /// Largest inverse depth; infinite when it passes the camera.
+    pub(super) nearest: f32,
+    pub(super) rows: [i32; 2],
+    pub(super) columns: [i32; 2],
     /// Inverse depth as a linear form of (u, v, 1).
     pub(super) inverse_depth: [f64; 3],
+    pub(super) edges: Edges,
 }
 
-impl Setup {
-    /// Inverse depth at (u, v).
-    pub(super) fn inverse_depth_at(&self, u: f64, v: f64) -> f64 {
-        let [along_u, along_v, constant] = self.inverse_depth;
-        along_u * u + (along_v * v + constant)
+/// A number of each of the triangles worked on.
+type Lanes = [f64; TOGETHER];
+
+/// What is worked out for several triangles at once.
+struct Together {
+    edges: [[Lanes; 3]; 3],
+    lines: [[Lanes; 2]; 3],
+    volume: Lanes,
+    inverse_depth: [Lanes; 3],
+    /// Largest inverse depth; infinite when the triangle passes the camera.
+    nearest: Lanes,
+    rows: [[i32; TOGETHER]; 2],
+    columns: [[i32; TOGETHER]; 2],
+    shows: [bool; TOGETHER],
+}
+
+/// Adds the setups of those of `triangles` (at most [`TOGETHER`]) that may show within `rows` of the image.
+#[inline(always)]
+pub(super) fn prepare(
+    scene: &Scene,
+    projection: &Projection,
+    rows: &Range<usize>,
+    triangles: &[u32],
+    setups: &mut Vec<Setup>,
+) {
+    let mut corners = [[[0.0; TOGETHER]; 3]; 3];
+    let mut codes = [Code(0); TOGETHER];
+    let count = triangles.len().min(TOGETHER);
+    for (lane, &triangle) in triangles.iter().enumerate().take(TOGETHER) {
+        codes[lane] = scene.codes()[triangle as usize];
+        for (corner, position) in scene.positions()[triangle as usize].iter().enumerate() {
+            for axis in 0..3 {
+                corners[corner][axis][lane] = f64::from(position[axis]);
+            }
+        }
     }
+    let found = together(projection, &corners);
+    for lane in (0..count).filter(|&lane| found.shows[lane]) {
+        let lines = |range: [[i32; TOGETHER]; 2]| [range[0][lane], range[1][lane]];
+        let shown = lines(found.rows);
+        let shown = [shown[0].max(rows.start as i32), shown[1].min(rows.end as i32)];
+        if shown[0] < shown[1] {
+            let inverse_depth = found.inverse_depth.map(|lanes| lanes[lane]);
+            let nearest = found.nearest[lane] as f32;
+            let edges = found.edges_of(lane, projection.width, nearest.is_infinite());
+            let columns = lines(found.columns);
+            setups.push(Setup { code: codes[lane], nearest, rows: shown, columns, inverse_depth, edges });
+        }
+    }
+}
+
+#[inline(always)]
+fn together(projection: &Projection, corners: &[[Lanes; 3]; 3]) -> Together {
+    let mut found = Together {
+        edges: [[[0.0; TOGETHER]; 3]; 3],
+        lines: [[[0.0; TOGETHER]; 2]; 3],
+        volume: [0.0; TOGETHER],
+        inverse_depth: [[0.0; TOGETHER]; 3],
+        nearest: [0.0; TOGETHER],
+        rows: [[0; TOGETHER]; 2],
+        columns: [[0; TOGETHER]; 2],
+        shows: [false; TOGETHER],
+    };
+    for lane in 0..TOGETHER {
+        let [a, b, c] = [0, 1, 2].map(|k| projection.pixel(corners[k].map(|axis| axis[lane])));
+        let edges = [cross(b, c), cross(c, a), cross(a, b)];
+        let volume = dot(a, edges[0]);
+        let limit = FLAT * FLAT * dot(a, a) * dot(b, b) * dot(c, c);
+        for (k, edge) in edges.into_iter().enumerate() {
+            for axis in 0..3 {
+                found.edges[k][axis][lane] = edge[axis];
+            }
+            found.lines[k][0][lane] = -edge[1] / edge[0];
+            found.lines[k][1][lane] = -edge[2] / edge[0];
+        }
+        for axis in 0..3 {
+            found.inverse_depth[axis][lane] = (edges[0][axis] + edges[1][axis] + edges[2][axis]) / volume;
+        }
+        found.volume[lane] = volume;
+        let (least_z, most_z) = (least(a[2], b[2], c[2]), most(a[2], b[2], c[2]));
+        let passes = least_z < NEAR_M;
+        found.nearest[lane] = if passes { f64::INFINITY } else { 1.0 / least_z };
+        let beyond = (a[0] < 0.0) & (b[0] < 0.0) & (c[0] < 0.0)
+            | (a[1] < 0.0) & (b[1] < 0.0) & (c[1] < 0.0)
+            | (a[0] > projection.width * a[2]) & (b[0] > projection.width * b[2]) & (c[0] > projection.width * c[2])
+            | (a[1] > projection.height * a[2]) & (b[1] > projection.height * b[2]) & (c[1] > projection.height * c[2]);
+        let sides = [(0, projection.width), (1, projection.height)].map(|(axis, size)| {
+            let at = [a[axis] / a[2], b[axis] / b[2], c[axis] / c[2]];
+            let low = first_centre(least(at[0], at[1], at[2]) - SLACK_PX, size);
+            let high = first_centre(most(at[0], at[1], at[2]) + SLACK_PX, size);
+            if passes { [0, size as i32] } else { [low, high] }
+        });
+        for k in 0..2 {
+            found.columns[k][lane] = sides[0][k];
+            found.rows[k][lane] = sides[1][k];
+        }
+        found.shows[lane] = (volume * volume > limit) & (most_z >= NEAR_M) & !beyond & (sides[0][0] < sides[0][1]);
+    }
+    found
+}
+
+impl Together {
+    /// The half planes that one of them covers.
+    #[inline(always)]
+    fn edges_of(&self, lane: usize, width: f64, passes: bool) -> Edges {
+        let mut edges = Edges::new(width);
+        for k in 0..3 {
+            // Shared edges have exactly opposite forms, so that their pixels fall to one side or the other.
+            let form = self.edges[k].map(|axis| if self.volume[lane] > 0.0 { axis[lane] } else { -axis[lane] });
+            edges.add(form, (self.lines[k][0][lane], self.lines[k][1][lane]));
+        }
+        if passes {
+            let [x, y, z] = self.inverse_depth.map(|axis| -axis[lane]);
+            let z = z + 1.0 / NEAR_M;
+            edges.add([x, y, z], (-y / x, -z / x));
+        }
+        edges
+    }
+}
+
+#[inline(always)]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn least(a: f64, b: f64, c: f64) -> f64 {
+    let ab = if a < b { a } else { b };
+    if ab < c { ab } else { c }
+}
+
+#[inline(always)]
+fn most(a: f64, b: f64, c: f64) -> f64 {
+    let ab = if a > b { a } else { b };
+    if ab > c { ab } else { c }
 }
 
 /// A triangle in homogeneous pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HomogeneousTriangle {
-    /// (u·z, v·z, z) of the corners.
-    corners: [Vector3<f64>; 3],
     /// The form of each edge, opposite the corner of the same index: zero along it.
     edges: [Vector3<f64>; 3],
     /// Six times the volume of the tetrahedron with the camera.
@@ -38,13 +180,12 @@ pub(super) struct HomogeneousTriangle {
 }
 
 impl HomogeneousTriangle {
-    /// The triangle with these corners; `None` when it is degenerate or seen edge-on.
-    pub(super) fn new(corners: [Vector3<f64>; 3]) -> Option<Self> {
-        let [a, b, c] = &corners;
-        let edges = [b.cross(c), c.cross(a), a.cross(b)];
-        let volume = a.dot(&edges[0]);
-        let limit = FLAT * FLAT * a.norm_squared() * b.norm_squared() * c.norm_squared();
-        (volume * volume > limit).then_some(Self { corners, edges, volume })
+    /// Triangle `triangle` of the scene.
+    pub(super) fn new(scene: &Scene, projection: &Projection, triangle: u32) -> Self {
+        let corners = scene.positions()[triangle as usize];
+        let [a, b, c] = corners.map(|corner| projection.pixel(corner.map(f64::from)));
+        let edges = [cross(b, c), cross(c, a), cross(a, b)];
+        Self { edges: edges.map(Vector3::from), volume: dot(a, edges[0]) }
     }
 
     /// A value given at the corners, divided by depth, as a linear form of (u, v, 1).
@@ -56,18 +197,5 @@ impl HomogeneousTriangle {
     /// Inverse depth as a linear form of (u, v, 1).
     pub(super) fn inverse_depth(&self) -> [f64; 3] {
         ((self.edges[0] + self.edges[1] + self.edges[2]) / self.volume).into()
-    }
-
-    /// The half planes that it covers, within `rows`.
-    pub(super) fn edges(&self, projection: &Projection, rows: std::ops::Range<usize>) -> Edges {
-        let mut edges = Edges::new(rows, projection.width);
-        for form in &self.edges {
-            // Shared edges have exactly opposite forms, so that their pixels fall to one side or the other.
-            edges.add(if self.volume > 0.0 { *form } else { -form });
-        }
-        if self.corners.iter().any(|corner| corner.z < NEAR_M) {
-            edges.add(Vector3::new(0.0, 0.0, 1.0 / NEAR_M) - Vector3::from(self.inverse_depth()));
-        }
-        edges
     }
 }

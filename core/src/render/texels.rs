@@ -1,7 +1,7 @@
 //! Classes of the pixels that a textured triangle covers: texture coordinates divided by depth are linear in the pixel.
 
 use super::scene::Scene;
-use super::setup::{HomogeneousTriangle, Setup};
+use super::setup::HomogeneousTriangle;
 use super::texture::texel_class;
 use crate::mesh::{LabelTexture, Surface, Wrap};
 use resurvey_schema::ClassId;
@@ -36,13 +36,13 @@ enum Rule {
 }
 
 impl Texels {
-    /// Texels of a drawn triangle; `None` when its surface has no texture.
-    pub(super) fn new(scene: &Scene, setup: &Setup, triangle: &HomogeneousTriangle) -> Option<Self> {
-        let Surface::Texture(texture) = scene.surface(setup.triangle as usize) else { return None };
-        let uvs = &scene.uvs()[setup.triangle as usize];
+    /// Texels of triangle `index` of the scene; `None` when its surface has no texture.
+    pub(super) fn new(scene: &Scene, index: u32, triangle: &HomogeneousTriangle) -> Option<Self> {
+        let Surface::Texture(texture) = scene.surface(index as usize) else { return None };
+        let uvs = &scene.uvs()[index as usize];
         let mut texels = Self {
             forms: [[0.0; 3]; 2],
-            inverse_depth: setup.inverse_depth,
+            inverse_depth: triangle.inverse_depth(),
             low: [0.0; 2],
             high: [0.0; 2],
             size: [texture.labels.width() as f32, texture.labels.height() as f32],
@@ -56,6 +56,7 @@ impl Texels {
     }
 
     /// Classes of the pixels from column `u`, row `v` on.
+    #[inline(always)]
     pub(super) fn fill(&self, texture: &LabelTexture, [u, v]: [usize; 2], pixels: &mut [u8]) {
         let (x, y) = (u as f64 + 0.5, v as f64 + 0.5);
         let start = |[along_u, along_v, constant]: [f64; 3]| (along_u * x + (along_v * y + constant)) as f32;
@@ -74,6 +75,7 @@ impl Texels {
         }
     }
 
+    #[inline(always)]
     fn look_up(
         &self,
         texture: &LabelTexture,

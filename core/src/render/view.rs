@@ -1,14 +1,17 @@
 //! The map as seen from a pose: class, range, point and feature per pixel from one ray each (Lee & Hsu, §3.5–3.8,
 //! Eq. 6–14).
 
+use super::band::{Band, LANES};
+use super::code::Code;
+use super::painter::{Painter, Triangles};
 use super::projection::Projection;
-use super::raster::Renderer;
 use super::rays::RayCaster;
 use super::scene::Scene;
-use super::setup::Setup;
+use super::shade::Shader;
 use crate::camera::{Camera, Pinhole, world_from_camera};
 use crate::image::{LabelImage, Raster};
 use nalgebra::Vector3;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use resurvey_schema::{GridPoint, Pose};
 
@@ -27,8 +30,8 @@ pub struct View {
     pub features: Raster<u32>,
 }
 
-/// One row of a view.
-struct Row<'a> {
+/// Neighbouring rows of a view.
+struct Rows<'a> {
     labels: &'a mut [u8],
     range_m: &'a mut [f32],
     points: &'a mut [[f32; 3]],
@@ -54,57 +57,108 @@ impl View {
         }
     }
 
-    /// Lets `write` fill the rows, in parallel.
-    fn fill(&mut self, write: impl Fn(usize, Row) + Sync) {
-        let width = (self.labels.width() as usize).max(1);
-        (self.labels.values_mut().par_chunks_mut(width))
-            .zip(self.range_m.values_mut().par_chunks_mut(width))
-            .zip(self.points.values_mut().par_chunks_mut(width))
-            .zip(self.features.values_mut().par_chunks_mut(width))
+    /// Index of the first of every `count` rows, and what they hold.
+    fn rows(&mut self, count: usize) -> impl IndexedParallelIterator<Item = (usize, Rows<'_>)> {
+        let pixels = (self.labels.width() as usize * count).max(1);
+        (self.labels.values_mut().par_chunks_mut(pixels))
+            .zip(self.range_m.values_mut().par_chunks_mut(pixels))
+            .zip(self.points.values_mut().par_chunks_mut(pixels))
+            .zip(self.features.values_mut().par_chunks_mut(pixels))
             .enumerate()
-            .for_each(|(v, (((labels, range_m), points), features))| {
-                write(v, Row { labels, range_m, points, features });
-            });
+            .map(move |(index, (((labels, range_m), points), features))| {
+                (index * count, Rows { labels, range_m, points, features })
+            })
     }
 }
 
+impl Rows<'_> {
+    /// The part of them that a band holds, which begins `first_pixel` in.
+    fn of_band(&mut self, first_pixel: usize, band: &Band) -> Rows<'_> {
+        let part = first_pixel..first_pixel + band.rows() * band.width();
+        Rows {
+            labels: &mut self.labels[part.clone()],
+            range_m: &mut self.range_m[part.clone()],
+            points: &mut self.points[part.clone()],
+            features: &mut self.features[part],
+        }
+    }
+}
+
+/// Rows that one thread works on at once.
+const TOGETHER: usize = 96;
+
 fn rasterised(scene: &Scene, camera: &Pinhole, pose: &Pose) -> View {
     let projection = Projection::new(scene, camera, pose);
-    let mut renderer = Renderer::new();
     let mut view = View::empty(scene, camera.width(), camera.height());
-    renderer.draw(scene, camera, &projection);
-    renderer.shade(scene, &projection, &mut view.labels);
-    view.fill(|v, row| {
-        for (first, length, setup) in renderer.runs(v) {
-            let run = first..first + length;
-            row.features[run.clone()].fill(scene.feature(setup.triangle as usize));
-            intersect(&projection, setup, [first, v], &mut row.range_m[run.clone()], &mut row.points[run]);
-        }
+    let start = || (Painter::new(Arch::new()), Shader::default());
+    view.rows(TOGETHER).for_each_init(start, |(painter, shader), (first_row, mut rows)| {
+        shader.start();
+        let end_row = first_row + rows.labels.len() / camera.width() as usize;
+        painter.draw(scene, Triangles::All, &projection, first_row..end_row, |arch, band| {
+            let rows = rows.of_band((band.first_row() - first_row) * band.width(), band);
+            shader.fill(arch, scene, &projection, band, rows.labels);
+            arch.dispatch(Measure { scene, projection: &projection, band, rows });
+        });
     });
     view
 }
 
-/// Range and point of the exact intersection of the triangle's plane with the rays of the pixels from column `u`, row
-/// `v` on.
-fn intersect(
+/// Ranges, points and features of the pixels of a band.
+struct Measure<'a> {
+    scene: &'a Scene,
+    projection: &'a Projection,
+    band: &'a Band,
+    rows: Rows<'a>,
+}
+
+impl WithSimd for Measure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { scene, projection, band, rows } = self;
+        let width = band.width();
+        for row in 0..band.rows() {
+            let codes = band.row(row).iter().flat_map(|block| &block.codes);
+            let features = &mut rows.features[row * width..(row + 1) * width];
+            let (mut last, mut last_feature) = (u32::MAX, 0);
+            for (feature, &code) in features.iter_mut().zip(codes) {
+                if code != last {
+                    last = code;
+                    last_feature = Code(code).triangle().map_or(0, |triangle| scene.feature(triangle as usize));
+                }
+                *feature = last_feature;
+            }
+            for (block, seen) in band.row(row).iter().enumerate() {
+                let first = block * LANES;
+                let pixels = row * width + first..row * width + (first + LANES).min(width);
+                let at = [first, band.first_row() + row];
+                let inverse_depths = &seen.inverse_depths;
+                measure(projection, at, inverse_depths, &mut rows.range_m[pixels.clone()], &mut rows.points[pixels]);
+            }
+        }
+    }
+}
+
+/// Ranges and points of the pixels from column `u`, row `v` on, from the depths along the optical axis.
+#[inline(always)]
+fn measure(
     projection: &Projection,
-    setup: &Setup,
     [u, v]: [usize; 2],
+    inverse_depths: &[f32; LANES],
     ranges_m: &mut [f32],
     points: &mut [[f32; 3]],
 ) {
-    let y = v as f64 + 0.5;
-    let per_column = projection.scene_from_pixels.column(0).into_owned();
-    let first_direction = projection.scene_from_pixels * Vector3::new(u as f64 + 0.5, y, 1.0);
-    let [step, _, _] = setup.inverse_depth;
-    let start = setup.inverse_depth_at(u as f64 + 0.5, y);
-    for (index, (range_m, point)) in ranges_m.iter_mut().zip(points).enumerate() {
-        let along = f64::from(index as i32);
-        let direction = first_direction + per_column * along;
-        let depth_m = 1.0 / (start + step * along);
-        *range_m = (direction.norm() * depth_m) as f32;
-        let offset = projection.centre + direction * depth_m;
-        *point = [offset.x as f32, offset.y as f32, offset.z as f32];
+    let per_column = projection.scene_from_pixels.column(0);
+    let first_direction = projection.scene_from_pixels * Vector3::new(u as f64 + 0.5, v as f64 + 0.5, 1.0);
+    for (lane, (range_m, point)) in ranges_m.iter_mut().zip(points).enumerate() {
+        if inverse_depths[lane] > 0.0 {
+            let depth_m = 1.0 / f64::from(inverse_depths[lane]);
+            let offset_m: [f64; 3] =
+                std::array::from_fn(|axis| (first_direction[axis] + per_column[axis] * lane as f64) * depth_m);
+            *range_m = offset_m.iter().map(|value| value * value).sum::<f64>().sqrt() as f32;
+            *point = std::array::from_fn(|axis| (projection.centre[axis] + offset_m[axis]) as f32);
+        }
     }
 }
 
@@ -115,7 +169,7 @@ fn cast(scene: &Scene, camera: &Camera, pose: &Pose) -> View {
     let caster = RayCaster::new(scene);
     let world_from_camera = world_from_camera(pose);
     let mut view = View::empty(scene, camera.width(), camera.height());
-    view.fill(|v, row| {
+    view.rows(1).for_each(|(v, row)| {
         for u in 0..camera.width() {
             let Some(ray) = camera.ray(f64::from(u) + 0.5, v as f64 + 0.5) else { continue };
             let direction = world_from_camera * ray;

@@ -1,0 +1,266 @@
+//! Draws bands of rows: what showed last time first, then what of the scene that does not hide.
+
+use super::band::{Band, Span};
+use super::code::Code;
+use super::edges::ROWS;
+use super::occlusion::{Occlusion, TILE};
+use super::projection::{Projection, Seen};
+use super::scene::Scene;
+use super::setup::{Setup, TOGETHER, prepare};
+use super::shown::Shown;
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
+
+/// Rows of a band.
+const BAND_ROWS: usize = 6 * TILE;
+/// Images from one look at what shows to the next.
+const LOOK_EVERY: u32 = 8;
+/// Triangles drawn in a band before it is looked at what they hide.
+const FIRST_LOOK: usize = 32;
+/// Growth of the number of triangles from one such look to the next.
+const LOOK_GROWTH: usize = 3;
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub(super) enum Triangles<'a> {
+    All,
+    /// Those with these indices.
+    Only(&'a [u32]),
+}
+
+/// Buffers for bands and for what is known of the image before.
+#[derive(Clone, Debug)]
+pub(super) struct Painter {
+    arch: Arch,
+    band: Band,
+    occlusion: Occlusion,
+    setups: Vec<Setup>,
+    /// Setups of what is drawn first, per band.
+    first: Vec<Vec<u32>>,
+    /// Of each cluster: the image for which it was prepared last, and its setups.
+    prepared: Vec<Prepared>,
+    /// Images drawn.
+    images: u64,
+    shown: Shown,
+    until_look: u32,
+    stack: Vec<u32>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Prepared {
+    image: u64,
+    setups: Range<u32>,
+}
+
+impl Painter {
+    pub(super) fn new(arch: Arch) -> Self {
+        Self {
+            arch,
+            band: Band::default(),
+            occlusion: Occlusion::default(),
+            setups: Vec::new(),
+            first: Vec::new(),
+            prepared: Vec::new(),
+            images: 0,
+            shown: Shown::default(),
+            until_look: 0,
+            stack: Vec::new(),
+        }
+    }
+
+    /// Makes the next image one of those in which it is looked at what shows.
+    pub(super) fn look_next(&mut self) {
+        self.until_look = 0;
+    }
+
+    /// Triangles that showed when it was last looked, rising.
+    pub(super) fn shown(&self) -> &[u32] {
+        self.shown.triangles()
+    }
+
+    /// Draws `rows` of the image, one band after the other, and lends each to `receive`.
+    pub(super) fn draw(
+        &mut self,
+        scene: &Scene,
+        triangles: Triangles,
+        projection: &Projection,
+        rows: Range<usize>,
+        mut receive: impl FnMut(Arch, &Band),
+    ) {
+        let whole = matches!(triangles, Triangles::All);
+        let looks = whole && self.until_look == 0;
+        if whole {
+            self.until_look = if looks { LOOK_EVERY - 1 } else { self.until_look - 1 };
+        }
+        let image = Image { scene, projection, rows: &rows, whole };
+        let arch = self.arch;
+        arch.dispatch(Start { painter: self, image, triangles });
+        for index in 0..rows.len().div_ceil(BAND_ROWS) {
+            arch.dispatch(Draw { painter: self, image, index });
+            if looks {
+                self.shown.look(&self.band);
+            }
+            receive(arch, &self.band);
+        }
+        if looks {
+            self.shown.finish_look();
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Image<'a> {
+    scene: &'a Scene,
+    projection: &'a Projection,
+    rows: &'a Range<usize>,
+    /// Whether all of the scene is drawn.
+    whole: bool,
+}
+
+/// Prepares what is drawn first.
+struct Start<'a> {
+    painter: &'a mut Painter,
+    image: Image<'a>,
+    triangles: Triangles<'a>,
+}
+
+impl WithSimd for Start<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { painter, image: Image { scene, projection, rows, .. }, triangles } = self;
+        let Painter { setups, first, prepared, images, shown, .. } = painter;
+        *images += 1;
+        setups.clear();
+        prepared.resize(scene.clusters().len(), Prepared::default());
+        shown.fit(scene.positions().len());
+        let triangles = match triangles {
+            Triangles::All => shown.triangles(),
+            Triangles::Only(triangles) => triangles,
+        };
+        let inside = triangles.iter().copied().filter(|&triangle| (triangle as usize) < scene.positions().len());
+        prepare_all(scene, projection, rows, inside, setups);
+        first.resize(rows.len().div_ceil(BAND_ROWS), Vec::new());
+        first.iter_mut().for_each(Vec::clear);
+        for (index, setup) in setups.iter().enumerate() {
+            let [from, to] = setup.rows.map(|row| row as usize - rows.start);
+            for band in &mut first[from / BAND_ROWS..(to - 1) / BAND_ROWS + 1] {
+                band.push(index as u32);
+            }
+        }
+    }
+}
+
+/// Draws one band.
+struct Draw<'a> {
+    painter: &'a mut Painter,
+    image: Image<'a>,
+    index: usize,
+}
+
+impl WithSimd for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { painter, image: Image { scene, projection, rows, whole }, index } = self;
+        let Painter { band, occlusion, setups, first, prepared, images, stack, shown, .. } = painter;
+        let first_row = rows.start + index * BAND_ROWS;
+        let band_rows = [first_row as i32, (first_row + BAND_ROWS).min(rows.end) as i32];
+        band.clear(first_row, band_rows[1] as usize - first_row, projection.width as usize, Code::sky(scene.sky()));
+        for &setup in &first[index] {
+            paint(band, &setups[setup as usize], band_rows);
+        }
+        if !whole {
+            return;
+        }
+        occlusion.clear();
+        if !first[index].is_empty() {
+            occlusion.take(band);
+        }
+        let (mut painted, mut next_look) = (0, FIRST_LOOK);
+        scene.hierarchy().walk(projection.eye(), stack, |bounds, cluster| {
+            let may_show = match projection.see(bounds) {
+                Seen::Outside => false,
+                Seen::Anywhere => true,
+                Seen::Within { columns, rows, nearest } => {
+                    let rows = common(rows, band_rows);
+                    rows[0] < rows[1] && !occlusion.hides(columns, rows, nearest)
+                }
+            };
+            let (true, Some(cluster)) = (may_show, cluster) else { return may_show };
+            let prepared = &mut prepared[cluster];
+            if prepared.image != *images {
+                let start = setups.len() as u32;
+                let triangles = scene.clusters()[cluster].triangles.clone();
+                let others = triangles.map(|triangle| triangle as u32).filter(|&triangle| !shown.holds(triangle));
+                prepare_all(scene, projection, rows, others, setups);
+                *prepared = Prepared { image: *images, setups: start..setups.len() as u32 };
+            }
+            for setup in &setups[prepared.setups.start as usize..prepared.setups.end as usize] {
+                let rows = common(setup.rows, band_rows);
+                if rows[0] < rows[1] && !occlusion.hides(setup.columns, rows, setup.nearest) {
+                    paint(band, setup, band_rows);
+                    painted += 1;
+                }
+            }
+            if painted >= next_look {
+                occlusion.take(band);
+                next_look = painted * LOOK_GROWTH;
+            }
+            true
+        });
+    }
+}
+
+#[inline(always)]
+fn common(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+    [a[0].max(b[0]), a[1].min(b[1])]
+}
+
+/// Adds the setups of those of `triangles` that may show within `rows`.
+#[inline(always)]
+fn prepare_all(
+    scene: &Scene,
+    projection: &Projection,
+    rows: &Range<usize>,
+    mut triangles: impl Iterator<Item = u32>,
+    setups: &mut Vec<Setup>,
+) {
+    loop {
+        let (mut some, mut count) = ([0; TOGETHER], 0);
+        for (place, triangle) in some.iter_mut().zip(&mut triangles) {
+            *place = triangle;
+            count += 1;
+        }
+        if count == 0 {
+            return;
+        }
+        prepare(scene, projection, rows, &some[..count], setups);
+    }
+}
+
+/// Draws a triangle into the rows of the band that it covers.
+#[inline(always)]
+fn paint(band: &mut Band, setup: &Setup, band_rows: [i32; 2]) {
+    let [first_row, end_row] = common(setup.rows, band_rows);
+    let [step, per_row, constant] = setup.inverse_depth;
+    for row in (first_row..end_row).step_by(ROWS) {
+        let columns = setup.edges.columns(row);
+        let (mut anchors, mut starts) = ([0.0; ROWS], [0.0; ROWS]);
+        for k in 0..ROWS {
+            let y = f64::from(row) + 0.5 + k as f64;
+            let anchor = f64::from(if step >= 0.0 { columns.first[k] } else { columns.end[k] - 1 });
+            anchors[k] = anchor as f32;
+            starts[k] = (step * (anchor + 0.5) + (per_row * y + constant)) as f32;
+        }
+        for k in 0..ROWS.min((end_row - row) as usize) {
+            let (first, end) = (columns.first[k], columns.end[k]);
+            if first < end {
+                let span = Span { first, end, anchor: anchors[k], start: starts[k], step: step as f32 };
+                band.draw((row - band_rows[0]) as usize + k, span, setup.code);
+            }
+        }
+    }
+}
