@@ -3,25 +3,35 @@
 use super::sweep::{ClassPlanes, PanoramaPhoto};
 use crate::camera::{Camera, camera_from_world};
 use crate::image::LabelImage;
-use crate::metrics::{BoundaryPhoto, overlap_counts};
+use crate::metrics::{ComparedPhoto, ViewPlanes};
 use crate::render::panorama::PanoramaGrid;
 use crate::render::{Renderer, Scene, view};
 use rayon::prelude::*;
 use resurvey_schema::service::{ClassCounts, CompareRequest, PanoramaRequest};
-use resurvey_schema::{GridPoint, Pose};
+use resurvey_schema::{ClassId, GridPoint, Pose};
+use std::sync::{Mutex, PoisonError};
 
 /// Tangents of elevation between which a panorama lies: from −39° to 63°, what a phone held upright in a street sees.
 const TANGENTS: [f64; 2] = [-0.8, 2.0];
 /// 128 rows: 1.25° at the horizon.
 const WORDS: usize = 2;
 
+/// Poses that a thread compares one after the other: neighbours show much the same.
+const TOGETHER: usize = 9;
+
 /// The photo at one stride, ready to be compared with views.
 pub struct ViewPhoto {
     camera: Camera,
-    labels: LabelImage,
-    boundaries: Option<BoundaryPhoto>,
-    request: CompareRequest,
+    photo: ComparedPhoto,
     classes: usize,
+    /// Comparers that no thread uses now: they know what showed last.
+    spare: Mutex<Vec<Comparer>>,
+}
+
+/// What one thread needs to compare views.
+pub struct Comparer {
+    renderer: Renderer,
+    planes: ViewPlanes,
 }
 
 impl ViewPhoto {
@@ -29,28 +39,52 @@ impl ViewPhoto {
     pub fn new(photo: &LabelImage, camera: &Camera, classes: usize, request: &CompareRequest) -> Self {
         let labels = every(photo, request.stride);
         let tolerance_px = request.boundary_tolerance_px / f64::from(request.stride);
-        let boundaries = (request.boundary_tolerance_px > 0.0).then(|| {
-            BoundaryPhoto::new(&labels, classes, tolerance_px, &request.ignored_in_photo, &request.ignored_in_view)
-        });
-        Self { camera: camera.subsampled(request.stride), labels, boundaries, request: *request, classes }
+        let CompareRequest { ignored_in_photo, ignored_in_view, .. } = request;
+        let photo = ComparedPhoto::new(&labels, classes, tolerance_px, ignored_in_photo, ignored_in_view);
+        Self { camera: camera.subsampled(request.stride), photo, classes, spare: Mutex::default() }
     }
 
     /// Fills `counts[pose][class]`.
     pub fn compare(&self, scene: &Scene, poses: &[Pose], counts: &mut [ClassCounts]) {
-        let blank = || (Renderer::new(), LabelImage::filled(self.labels.width(), self.labels.height(), 0));
-        let per_pose = poses.par_iter().zip(counts.par_chunks_mut(self.classes.max(1)));
-        per_pose.for_each_init(blank, |(renderer, seen), (pose, counts)| {
-            match self.camera.pinhole() {
-                Some(pinhole) => renderer.render_labels(scene, &pinhole, pose, seen),
-                None => *seen = view(scene, &self.camera, pose).labels,
-            }
-            let CompareRequest { ignored_in_photo, ignored_in_view, .. } = &self.request;
-            let overlaps = overlap_counts(&self.labels, seen, self.classes, ignored_in_photo, ignored_in_view);
-            counts.copy_from_slice(&overlaps);
-            if let Some(boundaries) = &self.boundaries {
-                boundaries.add_counts(seen, counts);
-            }
+        let per_pose = poses.par_chunks(TOGETHER).zip(counts.par_chunks_mut((TOGETHER * self.classes).max(1)));
+        per_pose.for_each(|(poses, counts)| {
+            self.with_comparer(|comparer| {
+                for (pose, counts) in poses.iter().zip(counts.chunks_mut(self.classes.max(1))) {
+                    self.compare_one(comparer, scene, pose, counts);
+                }
+            });
         });
+    }
+
+    /// Length of the counts of a pose.
+    pub fn classes(&self) -> usize {
+        self.classes
+    }
+
+    /// Lends what a thread needs for [`compare_one`](Self::compare_one).
+    pub fn with_comparer<T>(&self, work: impl FnOnce(&mut Comparer) -> T) -> T {
+        let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut comparer = spare.unwrap_or_else(|| Comparer { renderer: Renderer::new(), planes: self.photo.planes() });
+        let done = work(&mut comparer);
+        self.spare.lock().unwrap_or_else(PoisonError::into_inner).push(comparer);
+        done
+    }
+
+    /// Fills the counts of one pose, class by class; fastest when poses that follow each other show much the same.
+    pub fn compare_one(&self, comparer: &mut Comparer, scene: &Scene, pose: &Pose, counts: &mut [ClassCounts]) {
+        let Comparer { renderer, planes } = comparer;
+        match self.camera.pinhole() {
+            Some(pinhole) => renderer.render_rows(scene, &pinhole, pose, |v, classes| planes.set_row(v, classes)),
+            None => {
+                let seen = view(scene, &self.camera, pose).labels;
+                let mut row = vec![ClassId::VOID.0; (seen.width() as usize).next_multiple_of(64)];
+                for v in 0..seen.height() {
+                    row[..seen.width() as usize].copy_from_slice(seen.row(v));
+                    planes.set_row(v as usize, &row);
+                }
+            }
+        }
+        self.photo.count(planes, counts);
     }
 }
 

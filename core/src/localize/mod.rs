@@ -1,6 +1,7 @@
 //! Where the phone stood: the services that matchers use, the host-driven search, the reliability gate and the heat map.
 
 mod compare;
+mod exhaustive;
 mod gate;
 mod heatmap;
 mod locate;
@@ -9,6 +10,8 @@ mod services;
 mod sweep;
 mod world;
 
+pub use compare::{Comparer, ViewPhoto};
+pub use exhaustive::{Exhaustive, ExhaustiveRequest, Score, exhaustive};
 pub use gate::{GATE_KEYS, GateLimits};
 pub use heatmap::{HeatMap, HeatMapError, heat_map};
 pub use locate::{Located, localize};

@@ -1,131 +1,198 @@
-//! One-bit images, 64 pixels a word, rows padded to whole words: boundaries and disk dilation in a few operations a
-//! word.
+//! One-bit images, 64 pixels a word: boundaries and disk dilation in a few operations a word.
+//!
+//! Every row ends with a word of zeros, and so do the image and its top: neighbours of a word are the words before and
+//! after it and those one row away, at the border too.
+
+use crate::image::mask;
+use pulp::Simd;
+
+/// Pixels in a word.
+pub(super) const WORD: usize = 64;
+
+/// Size of a binary image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Size {
+    width: usize,
+    height: usize,
+}
 
 /// A binary image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Bits {
-    words_per_row: usize,
-    width: usize,
-    height: usize,
+    size: Size,
     words: Vec<u64>,
 }
 
-impl Bits {
+impl Size {
     pub(super) fn new(width: usize, height: usize) -> Self {
-        let words_per_row = width.div_ceil(64);
-        Self { words_per_row, width, height, words: vec![0; words_per_row * height] }
+        Self { width, height }
+    }
+
+    fn words_per_row(self) -> usize {
+        self.width.div_ceil(WORD) + 1
+    }
+
+    /// Index of the first word of row `v`.
+    #[inline(always)]
+    pub(super) fn row(self, v: usize) -> usize {
+        (v + 1) * self.words_per_row()
+    }
+
+    /// The words between those above the image and those below it.
+    fn inside(self) -> std::ops::Range<usize> {
+        self.row(0)..self.row(self.height)
+    }
+}
+
+impl Bits {
+    /// All zeros.
+    pub(super) fn new(size: Size) -> Self {
+        Self { size, words: vec![0; size.words_per_row() * (size.height + 2)] }
     }
 
     /// Ones where `pick` holds.
-    pub(super) fn from_pixels(width: usize, values: &[u8], pick: impl Fn(u8) -> bool) -> Self {
-        let mut bits = Self::new(width, values.len().checked_div(width).unwrap_or(0));
-        for (row, pixels) in bits.words.chunks_mut(bits.words_per_row.max(1)).zip(values.chunks(width.max(1))) {
-            for (word, chunk) in row.iter_mut().zip(pixels.chunks(64)) {
-                *word = chunk.iter().enumerate().fold(0, |word, (bit, &value)| word | u64::from(pick(value)) << bit);
+    pub(super) fn from_pixels(size: Size, values: &[u8], pick: impl Fn(u8) -> bool) -> Self {
+        let mut bits = Self::new(size);
+        for (v, pixels) in values.chunks(size.width.max(1)).enumerate() {
+            for (word, pixels) in bits.words[size.row(v)..].iter_mut().zip(pixels.chunks(WORD)) {
+                *word = pixels.iter().enumerate().fold(0, |word, (bit, &value)| word | u64::from(pick(value)) << bit);
             }
         }
         bits
     }
 
+    pub(super) fn size(&self) -> Size {
+        self.size
+    }
+
+    #[inline(always)]
+    pub(super) fn clear(&mut self) {
+        self.words.fill(0);
+    }
+
+    /// Takes one word of a row from 64 pixels: ones where they are `value`.
+    #[inline(always)]
+    pub(super) fn set_word<S: Simd>(&mut self, simd: S, index: usize, pixels: &[u8; WORD], value: u8) {
+        self.words[index] = mask(simd, pixels, value);
+    }
+
+    #[inline(always)]
+    pub(super) fn clear_word(&mut self, index: usize) {
+        self.words[index] = 0;
+    }
+
+    #[inline(always)]
+    pub(super) fn add_word(&mut self, index: usize, bits: u64) {
+        self.words[index] |= bits;
+    }
+
+    #[inline(always)]
     pub(super) fn count(&self) -> u32 {
-        self.words.iter().map(|word| word.count_ones()).sum()
+        let mut count = 0;
+        for word in &self.words {
+            count += word.count_ones();
+        }
+        count
     }
 
+    #[inline(always)]
     pub(super) fn count_and(&self, other: &Self) -> u32 {
-        self.words.iter().zip(&other.words).map(|(a, b)| (a & b).count_ones()).sum()
-    }
-
-    pub(super) fn and(mut self, other: &Self) -> Self {
-        self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a &= b);
-        self
-    }
-
-    fn row(&self, v: usize) -> &[u64] {
-        &self.words[v * self.words_per_row..(v + 1) * self.words_per_row]
-    }
-
-    /// Ones of `self` that have a 4-neighbour inside the image that is zero.
-    pub(super) fn boundary(&self) -> Self {
-        let mut out = Self::new(self.width, self.height);
-        for v in 0..self.height {
-            let (row, above) = (self.row(v), self.row(v.saturating_sub(1)));
-            let below = self.row((v + 1).min(self.height - 1));
-            for w in 0..self.words_per_row {
-                let inside = row[w] & self.left_of(row, w) & self.right_of(row, w) & above[w] & below[w];
-                out.words[v * self.words_per_row + w] = row[w] & !inside;
-            }
+        let mut count = 0;
+        for (a, b) in self.words.iter().zip(&other.words) {
+            count += (a & b).count_ones();
         }
-        out
+        count
     }
 
-    /// Each pixel's left neighbour; the first column has itself.
-    fn left_of(&self, row: &[u64], w: usize) -> u64 {
-        let carry = if w == 0 { row[0] & 1 } else { row[w - 1] >> 63 };
-        row[w] << 1 | carry
-    }
-
-    /// Each pixel's right neighbour; the last column has itself.
-    fn right_of(&self, row: &[u64], w: usize) -> u64 {
-        let last = (self.width - 1) % 64;
-        if w + 1 < self.words_per_row {
-            row[w] >> 1 | row[w + 1] << 63
-        } else {
-            (row[w] >> 1 & !(1 << last)) | row[w] & 1 << last
+    #[inline(always)]
+    pub(super) fn and(&mut self, other: &Self) {
+        for (a, b) in self.words.iter_mut().zip(&other.words) {
+            *a &= b;
         }
     }
 
-    /// Ones within Euclidean distance `radius_px` (pixel centres) of a one.
-    pub(super) fn dilated(&self, radius_px: f64) -> Self {
-        let mut out = Self::new(self.width, self.height);
-        let reach = radius_px.max(0.0).floor() as usize;
-        for dv in 0..=reach {
-            let half = (radius_px * radius_px - (dv * dv) as f64).max(0.0).sqrt().floor() as usize;
-            let wide = self.dilated_along_rows(half);
-            for v in 0..self.height {
-                for target in [v.checked_sub(dv), (dv > 0).then_some(v + dv)].into_iter().flatten() {
-                    if target < self.height {
-                        let start = target * self.words_per_row;
-                        for (word, &add) in out.words[start..start + self.words_per_row].iter_mut().zip(wide.row(v)) {
-                            *word |= add;
-                        }
-                    }
-                }
-            }
+    #[inline(always)]
+    pub(super) fn or(&mut self, other: &Self) {
+        for (a, b) in self.words.iter_mut().zip(&other.words) {
+            *a |= b;
         }
-        out
     }
 
-    fn dilated_along_rows(&self, half: usize) -> Self {
-        let mut out = self.clone();
+    /// Ones of `self` that have a 4-neighbour inside the image (all ones in `whole`) that is zero.
+    #[inline(always)]
+    pub(super) fn boundary_into(&self, whole: &Self, out: &mut Self) {
+        let inside = self.size.inside();
+        let (count, row) = (inside.len(), self.size.words_per_row());
+        let from = |first: usize| first..first + count;
+        let (here, up, down) = (inside.clone(), from(inside.start - row), from(inside.start + row));
+        let (left, right) = (from(inside.start - 1), from(inside.start + 1));
+        let (x, all) = (&self.words, &whole.words);
+        let (x_up, x_down, x_left, x_right) = (&x[up.clone()], &x[down.clone()], &x[left.clone()], &x[right.clone()]);
+        let (all_up, all_down, all_left, all_right) = (&all[up], &all[down], &all[left], &all[right]);
+        let (x, all, out) = (&x[here.clone()], &all[here.clone()], &mut out.words[here]);
+        for k in 0..count {
+            let zero = !x[k] & all[k];
+            let beside = zero << 1 | (!x_left[k] & all_left[k]) >> 63 | zero >> 1 | (!x_right[k] & all_right[k]) << 63;
+            out[k] = x[k] & (beside | (!x_up[k] & all_up[k]) | (!x_down[k] & all_down[k]));
+        }
+    }
+
+    /// Ones within a disk of a one; `wide` and `spare` are scratch space of the same size.
+    #[inline(always)]
+    pub(super) fn dilated_into(&self, disk: &Disk, out: &mut Self, [wide, spare]: [&mut Self; 2]) {
+        let row = self.size.words_per_row();
+        out.clear();
+        wide.words.copy_from_slice(&self.words);
         let mut done = 0;
-        while done < half {
-            let step = (half - done).min(done.max(1)).min(63);
-            for row in out.words.chunks_mut(self.words_per_row) {
-                spread(row, step);
+        for &(dv, half) in &disk.rows {
+            while done < half {
+                let step = (half - done).min(done.max(1)).min(WORD - 1);
+                wide.spread_into(step, spare);
+                std::mem::swap(&mut wide.words, &mut spare.words);
+                done += step;
             }
-            done += step;
+            if dv >= self.size.height {
+                continue;
+            }
+            let (first, end) = (self.size.row(0), self.size.row(self.size.height));
+            let shift = dv * row;
+            // What is above and below the image is nobody's.
+            let (to, from) = (&mut out.words[first..end - shift], &wide.words[first + shift..end]);
+            to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
+            let (to, from) = (&mut out.words[first + shift..end], &wide.words[first..end - shift]);
+            to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
         }
-        out.clear_padding();
-        out
     }
 
-    fn clear_padding(&mut self) {
-        let used = self.width % 64;
-        if used != 0 {
-            for row in self.words.chunks_mut(self.words_per_row) {
-                row[self.words_per_row - 1] &= (1 << used) - 1;
-            }
+    /// ORs all rows with themselves shifted by `step` (1–63) pixels to both sides.
+    #[inline(always)]
+    fn spread_into(&self, step: usize, out: &mut Self) {
+        let inside = self.size.inside();
+        let (count, row) = (inside.len(), self.size.words_per_row());
+        let (x, left) = (&self.words[inside.clone()], &self.words[inside.start - 1..inside.end - 1]);
+        let right = &self.words[inside.start + 1..inside.end + 1];
+        let out = &mut out.words[inside];
+        let back = WORD - step;
+        for k in 0..count {
+            out[k] = x[k] | x[k] << step | left[k] >> back | x[k] >> step | right[k] << back;
         }
+        // What leaves a row does not enter the next.
+        out.iter_mut().skip(row - 1).step_by(row).for_each(|word| *word = 0);
     }
 }
 
-/// ORs a row with itself shifted by `step` (1–63) pixels to both sides.
-fn spread(row: &mut [u64], step: usize) {
-    let source = row.to_vec();
-    for w in 0..row.len() {
-        let from_left = if w == 0 { 0 } else { source[w - 1] >> (64 - step) };
-        let from_right = if w + 1 == row.len() { 0 } else { source[w + 1] << (64 - step) };
-        row[w] |= source[w] << step | from_left | source[w] >> step | from_right;
+/// The pixels whose centres lie within a radius of a centre.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Disk {
+    /// Distance of a row of it from its middle, and how far it reaches along that row, narrowest first.
+    rows: Vec<(usize, usize)>,
+}
+
+impl Disk {
+    pub(super) fn new(radius_px: f64) -> Self {
+        let reach = radius_px.max(0.0).floor() as usize;
+        let half = |dv: usize| (radius_px * radius_px - (dv * dv) as f64).max(0.0).sqrt().floor() as usize;
+        Self { rows: (0..=reach).rev().map(|dv| (dv, half(dv))).collect() }
     }
 }
 
@@ -151,7 +218,8 @@ mod tests {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 u8::from(state >> 58 < 3)
             }).collect();
-            let bits = Bits::from_pixels(width, &values, |value| value == 1);
+            let size = Size::new(width, height);
+            let ones = |values: &[u8]| Bits::from_pixels(size, values, |value| value == 1);
             let reach = radius.floor() as i64;
             let (mut dilated, mut boundary) = (values.clone(), values.clone());
             for v in 0..height as i64 {
@@ -166,8 +234,13 @@ mod tests {
                     boundary[index] = u8::from(values[index] == 1 && edge);
                 }
             }
-            prop_assert_eq!(bits.dilated(radius), Bits::from_pixels(width, &dilated, |value| value == 1));
-            prop_assert_eq!(bits.boundary(), Bits::from_pixels(width, &boundary, |value| value == 1));
+            let whole = Bits::from_pixels(size, &values, |_| true);
+            let (mut found, mut wide, mut spare) = (Bits::new(size), Bits::new(size), Bits::new(size));
+            ones(&values).dilated_into(&Disk::new(radius), &mut found, [&mut wide, &mut spare]);
+            found.and(&whole);
+            prop_assert_eq!(&found, &ones(&dilated));
+            ones(&values).boundary_into(&whole, &mut found);
+            prop_assert_eq!(&found, &ones(&boundary));
         }
     }
 }

@@ -2,8 +2,8 @@
 //! (Lee & Hsu, §3.4, Eq. 5).
 
 mod bits;
-mod boundary;
+mod compared;
 mod overlap;
 
-pub use boundary::BoundaryPhoto;
+pub use compared::{ComparedPhoto, ViewPlanes};
 pub use overlap::{class_count, overlap_counts};

@@ -1,6 +1,7 @@
 //! The depth and triangle buffers of a band of rows: few enough rows that they stay in a core's cache.
 
 use super::code::Code;
+use pulp::Simd;
 
 /// Pixels worked on at once: one vector of the widest instruction set.
 pub(super) const LANES: usize = 16;
@@ -32,6 +33,18 @@ pub(super) struct Span {
     pub(super) anchor: f32,
     pub(super) start: f32,
     pub(super) step: f32,
+}
+
+impl Block {
+    /// Whether all of its pixels have this code.
+    #[inline(always)]
+    pub(super) fn is_all(&self, code: Code) -> bool {
+        let mut differing = 0;
+        for lane in 0..LANES {
+            differing |= self.codes[lane] ^ code.0;
+        }
+        differing == 0
+    }
 }
 
 impl Band {
@@ -74,27 +87,35 @@ impl Band {
     /// Draws a triangle's span in a row where it is nearer than what is there; among equals the one with the lower
     /// index shows.
     #[inline(always)]
-    pub(super) fn draw(&mut self, row: usize, span: Span, code: Code) {
+    pub(super) fn draw<S: Simd>(&mut self, simd: S, row: usize, span: Span, code: Code) {
         let Span { first, end, anchor, start, step } = span;
-        let blocks = &mut self.blocks[row * self.blocks_per_row..(row + 1) * self.blocks_per_row];
+        let row = &mut self.blocks[row * self.blocks_per_row..(row + 1) * self.blocks_per_row];
         let (from, to) = (first as usize / LANES, (end as usize).div_ceil(LANES));
+        let (lanes, lane_indices) = (S::as_simd_f32s(&LANE).0, S::as_simd_u32s(&LANE_INDEX).0);
+        let (start, step, code) = (simd.splat_f32s(start), simd.splat_f32s(step), simd.splat_u32s(code.0));
+        let length = simd.splat_u32s((end - first) as u32);
         let mut column = (from * LANES) as i32;
-        for block in &mut blocks[from..to] {
-            let past = column as f32 - anchor;
-            let (low, high) = (first - column, end - column);
-            for lane in 0..LANES {
-                let inverse_depth = start + step * (past + lane as f32);
-                let (nearest, winner) = (block.inverse_depths[lane], block.codes[lane]);
-                let equal = inverse_depth.to_bits() == nearest.to_bits();
-                let nearer = (inverse_depth > nearest) | (equal & (code.0 < winner));
-                let inside = ((lane as i32) >= low) & ((lane as i32) < high);
-                // Masks instead of a choice: a choice becomes a branch per pixel, this becomes vector code.
-                let mask = u32::from(nearer & inside).wrapping_neg();
-                block.inverse_depths[lane] =
-                    f32::from_bits((inverse_depth.to_bits() & mask) | (nearest.to_bits() & !mask));
-                block.codes[lane] = (code.0 & mask) | (winner & !mask);
+        for block in &mut row[from..to] {
+            let past = simd.splat_f32s(column as f32 - anchor);
+            let inside = simd.splat_u32s((column - first) as u32);
+            let nearest = S::as_mut_simd_f32s(&mut block.inverse_depths).0;
+            let winner = S::as_mut_simd_u32s(&mut block.codes).0;
+            for k in 0..nearest.len() {
+                // No fused multiplication and addition: the same bits on every instruction set.
+                let along = simd.mul_f32s(step, simd.add_f32s(past, lanes[k]));
+                let inverse_depth = simd.add_f32s(start, along);
+                let equal = simd.equal_f32s(inverse_depth, nearest[k]);
+                let first_of_equals = simd.and_m32s(equal, simd.less_than_u32s(code, winner[k]));
+                let nearer = simd.or_m32s(simd.greater_than_f32s(inverse_depth, nearest[k]), first_of_equals);
+                let inside = simd.less_than_u32s(simd.add_u32s(inside, lane_indices[k]), length);
+                let shows = simd.and_m32s(nearer, inside);
+                nearest[k] = simd.select_f32s(shows, inverse_depth, nearest[k]);
+                winner[k] = simd.select_u32s(shows, code, winner[k]);
             }
             column += LANES as i32;
         }
     }
 }
+
+const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+const LANE_INDEX: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];

@@ -59,18 +59,69 @@ impl Hierarchy {
     /// Walks from near `eye` to far: `enter` is called with each box and, at a leaf, the index of its cluster; what lies
     /// in a box that it does not accept is left out. `stack` is scratch space.
     pub fn walk(&self, eye: [f32; 3], stack: &mut Vec<u32>, mut enter: impl FnMut(&Bounds, Option<usize>) -> bool) {
+        let mut walk = self.start(eye, stack);
+        while let Some(place) = walk.next() {
+            if enter(&place.node.bounds, place.cluster()) {
+                walk.enter(place);
+            }
+        }
+    }
+
+    /// The same walk, step by step.
+    #[inline(always)]
+    pub(super) fn start<'a>(&'a self, eye: [f32; 3], stack: &'a mut Vec<u32>) -> Walk<'a> {
         stack.clear();
         stack.extend((!self.nodes.is_empty()).then_some(0));
-        while let Some(index) = stack.pop() {
-            let node = &self.nodes[index as usize];
-            let is_leaf = node.axis == LEAF;
-            if !enter(&node.bounds, is_leaf.then_some(node.link as usize)) || is_leaf {
-                continue;
-            }
-            let [near, far] =
-                if eye[usize::from(node.axis)] < node.middle { [index + 1, node.link] } else { [node.link, index + 1] };
-            stack.extend([far, near]);
+        Walk { nodes: &self.nodes, eye, stack }
+    }
+}
+
+/// A walk under way.
+pub(super) struct Walk<'a> {
+    nodes: &'a [Node],
+    eye: [f32; 3],
+    stack: &'a mut Vec<u32>,
+}
+
+/// A box met on a walk.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    index: u32,
+    node: &'a Node,
+}
+
+impl<'a> Walk<'a> {
+    /// The next box; what lies in it is left out unless it is entered.
+    #[inline(always)]
+    pub(super) fn next(&mut self) -> Option<Place<'a>> {
+        let index = self.stack.pop()?;
+        Some(Place { index, node: &self.nodes[index as usize] })
+    }
+
+    /// Takes what lies in the box just met next.
+    #[inline(always)]
+    pub(super) fn enter(&mut self, Place { index, node }: Place) {
+        if node.axis == LEAF {
+            return;
         }
+        let first_is_near = self.eye[usize::from(node.axis)] < node.middle;
+        let [near, far] = if first_is_near { [index + 1, node.link] } else { [node.link, index + 1] };
+        self.stack.push(far);
+        self.stack.push(near);
+    }
+}
+
+impl Place<'_> {
+    /// The box.
+    #[inline(always)]
+    pub(super) fn bounds(&self) -> &Bounds {
+        &self.node.bounds
+    }
+
+    /// The cluster of a leaf.
+    #[inline(always)]
+    pub(super) fn cluster(&self) -> Option<usize> {
+        (self.node.axis == LEAF).then_some(self.node.link as usize)
     }
 }
 

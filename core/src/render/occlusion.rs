@@ -44,8 +44,11 @@ impl Occlusion {
                         least[lane] = smaller(here[lane], least[lane]);
                     }
                 }
-                for tile in least.chunks_exact(TILE) {
-                    let halves: [f32; 4] = std::array::from_fn(|lane| smaller(tile[lane], tile[lane + 4]));
+                for tile in 0..ABREAST {
+                    let mut halves = [0.0; 4];
+                    for lane in 0..4 {
+                        halves[lane] = smaller(least[tile * TILE + lane], least[tile * TILE + lane + 4]);
+                    }
                     self.farthest.push(smaller(smaller(halves[0], halves[2]), smaller(halves[1], halves[3])));
                 }
             }
@@ -60,18 +63,25 @@ impl Occlusion {
             return false;
         }
         let nearest = nearest * (1.0 + CERTAIN);
-        let tiles = |first: i32, end: i32, size: usize| {
-            let held = |pixel: i32| (pixel.max(0) as usize).min(size - 1) / TILE;
-            held(first)..held(end - 1) + 1
-        };
         let start = self.first_row as i32;
-        let (columns, rows) =
-            (tiles(columns[0], columns[1], self.width), tiles(rows[0] - start, rows[1] - start, self.rows));
-        rows.into_iter().all(|row| {
-            let row = &self.farthest[row * self.columns..(row + 1) * self.columns];
-            row.get(columns.clone()).is_some_and(|tiles| tiles.iter().all(|farthest| *farthest > nearest))
-        })
+        let (left, right) = (tile(columns[0], self.width), tile(columns[1] - 1, self.width));
+        for row in tile(rows[0] - start, self.rows)..=tile(rows[1] - 1 - start, self.rows) {
+            let mut hidden = true;
+            for farthest in &self.farthest[row * self.columns + left..=row * self.columns + right.max(left)] {
+                hidden &= *farthest > nearest;
+            }
+            if !hidden {
+                return false;
+            }
+        }
+        true
     }
+}
+
+/// The tile of a pixel, or the nearest one.
+#[inline(always)]
+fn tile(pixel: i32, size: usize) -> usize {
+    (pixel.max(0) as usize).min(size - 1) / TILE
 }
 
 #[inline(always)]

@@ -139,8 +139,9 @@ impl WithSimd for Start<'_> {
             Triangles::All => shown.triangles(),
             Triangles::Only(triangles) => triangles,
         };
-        let inside = triangles.iter().copied().filter(|&triangle| (triangle as usize) < scene.positions().len());
-        prepare_all(scene, projection, rows, inside, setups);
+        for triangles in triangles.chunks(TOGETHER) {
+            prepare(scene, projection, rows, triangles, setups);
+        }
         first.resize(rows.len().div_ceil(BAND_ROWS), Vec::new());
         first.iter_mut().for_each(Vec::clear);
         for (index, setup) in setups.iter().enumerate() {
@@ -163,14 +164,15 @@ impl WithSimd for Draw<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self { painter, image: Image { scene, projection, rows, whole }, index } = self;
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { painter, image, index } = self;
+        let Image { scene, projection, rows, whole } = image;
         let Painter { band, occlusion, setups, first, prepared, images, stack, shown, .. } = painter;
         let first_row = rows.start + index * BAND_ROWS;
         let band_rows = [first_row as i32, (first_row + BAND_ROWS).min(rows.end) as i32];
         band.clear(first_row, band_rows[1] as usize - first_row, projection.width as usize, Code::sky(scene.sky()));
         for &setup in &first[index] {
-            paint(band, &setups[setup as usize], band_rows);
+            paint(simd, band, &setups[setup as usize], band_rows);
         }
         if !whole {
             return;
@@ -180,8 +182,9 @@ impl WithSimd for Draw<'_> {
             occlusion.take(band);
         }
         let (mut painted, mut next_look) = (0, FIRST_LOOK);
-        scene.hierarchy().walk(projection.eye(), stack, |bounds, cluster| {
-            let may_show = match projection.see(bounds) {
+        let mut walk = scene.hierarchy().start(projection.eye(), stack);
+        while let Some(place) = walk.next() {
+            let may_show = match projection.see(place.bounds()) {
                 Seen::Outside => false,
                 Seen::Anywhere => true,
                 Seen::Within { columns, rows, nearest } => {
@@ -189,19 +192,23 @@ impl WithSimd for Draw<'_> {
                     rows[0] < rows[1] && !occlusion.hides(columns, rows, nearest)
                 }
             };
-            let (true, Some(cluster)) = (may_show, cluster) else { return may_show };
+            if !may_show {
+                continue;
+            }
+            let Some(cluster) = place.cluster() else {
+                walk.enter(place);
+                continue;
+            };
             let prepared = &mut prepared[cluster];
             if prepared.image != *images {
                 let start = setups.len() as u32;
-                let triangles = scene.clusters()[cluster].triangles.clone();
-                let others = triangles.map(|triangle| triangle as u32).filter(|&triangle| !shown.holds(triangle));
-                prepare_all(scene, projection, rows, others, setups);
+                prepare_others(&image, shown, scene.clusters()[cluster].triangles.clone(), setups);
                 *prepared = Prepared { image: *images, setups: start..setups.len() as u32 };
             }
             for setup in &setups[prepared.setups.start as usize..prepared.setups.end as usize] {
                 let rows = common(setup.rows, band_rows);
                 if rows[0] < rows[1] && !occlusion.hides(setup.columns, rows, setup.nearest) {
-                    paint(band, setup, band_rows);
+                    paint(simd, band, setup, band_rows);
                     painted += 1;
                 }
             }
@@ -209,8 +216,7 @@ impl WithSimd for Draw<'_> {
                 occlusion.take(band);
                 next_look = painted * LOOK_GROWTH;
             }
-            true
-        });
+        }
     }
 }
 
@@ -219,31 +225,25 @@ fn common(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0].max(b[0]), a[1].min(b[1])]
 }
 
-/// Adds the setups of those of `triangles` that may show within `rows`.
+/// Adds the setups of those of `triangles` that may show and are not drawn first.
 #[inline(always)]
-fn prepare_all(
-    scene: &Scene,
-    projection: &Projection,
-    rows: &Range<usize>,
-    mut triangles: impl Iterator<Item = u32>,
-    setups: &mut Vec<Setup>,
-) {
-    loop {
-        let (mut some, mut count) = ([0; TOGETHER], 0);
-        for (place, triangle) in some.iter_mut().zip(&mut triangles) {
-            *place = triangle;
+fn prepare_others(image: &Image, shown: &Shown, triangles: Range<usize>, setups: &mut Vec<Setup>) {
+    let (mut others, mut count) = ([0; TOGETHER], 0);
+    for triangle in triangles.clone() {
+        if !shown.holds(triangle as u32) {
+            others[count] = triangle as u32;
             count += 1;
         }
-        if count == 0 {
-            return;
+        if count == TOGETHER || (count > 0 && triangle + 1 == triangles.end) {
+            prepare(image.scene, image.projection, image.rows, &others[..count], setups);
+            count = 0;
         }
-        prepare(scene, projection, rows, &some[..count], setups);
     }
 }
 
 /// Draws a triangle into the rows of the band that it covers.
 #[inline(always)]
-fn paint(band: &mut Band, setup: &Setup, band_rows: [i32; 2]) {
+fn paint<S: Simd>(simd: S, band: &mut Band, setup: &Setup, band_rows: [i32; 2]) {
     let [first_row, end_row] = common(setup.rows, band_rows);
     let [step, per_row, constant] = setup.inverse_depth;
     for row in (first_row..end_row).step_by(ROWS) {
@@ -259,7 +259,7 @@ fn paint(band: &mut Band, setup: &Setup, band_rows: [i32; 2]) {
             let (first, end) = (columns.first[k], columns.end[k]);
             if first < end {
                 let span = Span { first, end, anchor: anchors[k], start: starts[k], step: step as f32 };
-                band.draw((row - band_rows[0]) as usize + k, span, setup.code);
+                band.draw(simd, (row - band_rows[0]) as usize + k, span, setup.code);
             }
         }
     }

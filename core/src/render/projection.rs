@@ -70,14 +70,19 @@ impl Projection {
     /// Where `bounds` is seen.
     #[inline(always)]
     pub(super) fn see(&self, bounds: &Bounds) -> Seen {
-        let centre = [self.centre.x, self.centre.y, self.centre.z];
-        let low: [f64; 3] = std::array::from_fn(|axis| f64::from(bounds.min[axis]) - centre[axis]);
-        let high: [f64; 3] = std::array::from_fn(|axis| f64::from(bounds.max[axis]) - centre[axis]);
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            low[axis] = f64::from(bounds.min[axis]) - self.centre[axis];
+            high[axis] = f64::from(bounds.max[axis]) - self.centre[axis];
+        }
         let mut corners = [[0.0; 8]; 3];
-        for (row, corners) in self.pixels_from_scene.iter().zip(&mut corners) {
-            for (corner, value) in corners.iter_mut().enumerate() {
-                let pick = |axis: usize| row[axis] * if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-                *value = pick(0) + pick(1) + pick(2);
+        for k in 0..3 {
+            let [east, north, up] = self.pixels_from_scene[k];
+            let easts = [low[0] * east, high[0] * east];
+            let norths = [low[1] * north, high[1] * north];
+            let ups = [low[2] * up, high[2] * up];
+            for corner in 0..8 {
+                corners[k][corner] = easts[corner & 1] + norths[corner >> 1 & 1] + ups[corner >> 2];
             }
         }
         let [u, v, z] = &corners;
@@ -86,11 +91,11 @@ impl Projection {
         }
         let least_z = smallest(z);
         if least_z < NEAR_M {
-            return if self.sides.iter().any(|side| reach(side, &low, &high) < 0.0) {
-                Seen::Outside
-            } else {
-                Seen::Anywhere
-            };
+            let mut outside = false;
+            for side in &self.sides {
+                outside |= reach(side, &low, &high) < 0.0;
+            }
+            return if outside { Seen::Outside } else { Seen::Anywhere };
         }
         let (mut columns, mut rows) = ([0.0; 8], [0.0; 8]);
         for corner in 0..8 {
@@ -111,19 +116,30 @@ impl Projection {
 /// The largest value of a linear form in a box.
 #[inline(always)]
 fn reach(form: &[f64; 3], low: &[f64; 3], high: &[f64; 3]) -> f64 {
-    (0..3).map(|axis| (form[axis] * low[axis]).max(form[axis] * high[axis])).sum()
+    let mut sum = 0.0;
+    for axis in 0..3 {
+        let (a, b) = (form[axis] * low[axis], form[axis] * high[axis]);
+        sum += if a > b { a } else { b };
+    }
+    sum
 }
 
 #[inline(always)]
 fn smallest(values: &[f64; 8]) -> f64 {
     let smaller = |a: f64, b: f64| if a < b { a } else { b };
-    let halves: [f64; 4] = std::array::from_fn(|k| smaller(values[k], values[k + 4]));
+    let mut halves = [0.0; 4];
+    for k in 0..4 {
+        halves[k] = smaller(values[k], values[k + 4]);
+    }
     smaller(smaller(halves[0], halves[2]), smaller(halves[1], halves[3]))
 }
 
 #[inline(always)]
 fn largest(values: &[f64; 8]) -> f64 {
     let larger = |a: f64, b: f64| if a > b { a } else { b };
-    let halves: [f64; 4] = std::array::from_fn(|k| larger(values[k], values[k + 4]));
+    let mut halves = [0.0; 4];
+    for k in 0..4 {
+        halves[k] = larger(values[k], values[k + 4]);
+    }
     larger(larger(halves[0], halves[2]), larger(halves[1], halves[3]))
 }

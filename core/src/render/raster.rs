@@ -5,13 +5,14 @@
 //! and culling cannot change an image. So it is drawn in bands of rows that stay in cache, what showed last time first,
 //! then whatever of the scene that does not hide.
 
+use super::band::{Band, LANES};
 use super::painter::{Painter, Triangles};
 use super::projection::Projection;
 use super::scene::Scene;
 use super::shade::Shader;
 use crate::camera::Pinhole;
-use crate::image::LabelImage;
-use pulp::Arch;
+use crate::image::{LabelImage, Raster};
+use pulp::{Arch, Simd, WithSimd};
 use resurvey_schema::Pose;
 
 /// Buffers and code to draw one image after the other without allocating anew; one per thread. Fastest when an image is
@@ -69,6 +70,44 @@ impl Renderer {
         self.painter.shown().to_vec()
     }
 
+    /// Classes as `camera` sees them from `pose`, row by row: `receive` gets the index of each row and its classes,
+    /// padded with void to a multiple of 64 pixels.
+    pub fn render_rows(&mut self, scene: &Scene, camera: &Pinhole, pose: &Pose, mut receive: impl FnMut(usize, &[u8])) {
+        let projection = Projection::new(scene, camera, pose);
+        let Self { painter, shader } = self;
+        shader.start();
+        painter.draw(scene, Triangles::All, &projection, 0..camera.height() as usize, |arch, band| {
+            let rows = shader.rows(arch, scene, &projection, band).enumerate();
+            rows.for_each(|(row, classes)| receive(band.first_row() + row, classes));
+        });
+    }
+
+    /// Classes, and depths along the optical axis, metres, infinite where nothing is; both get the camera's size.
+    pub fn render_labels_and_depths(
+        &mut self,
+        scene: &Scene,
+        camera: &Pinhole,
+        pose: &Pose,
+        (labels, depths_m): (&mut LabelImage, &mut Raster<f32>),
+    ) {
+        let projection = Projection::new(scene, camera, pose);
+        let (columns, rows) = (camera.width(), camera.height());
+        if (labels.width(), labels.height()) != (columns, rows) {
+            *labels = LabelImage::filled(columns, rows, scene.sky().0);
+        }
+        if (depths_m.width(), depths_m.height()) != (columns, rows) {
+            *depths_m = Raster::filled(columns, rows, f32::INFINITY);
+        }
+        let Self { painter, shader } = self;
+        shader.start();
+        let (width, labels, depths_m) = (columns as usize, labels.values_mut(), depths_m.values_mut());
+        painter.draw(scene, Triangles::All, &projection, 0..rows as usize, |arch, band| {
+            let part = band.first_row() * width..(band.first_row() + band.rows()) * width;
+            shader.fill(arch, scene, &projection, band, &mut labels[part.clone()]);
+            arch.dispatch(Depths { band, depths_m: &mut depths_m[part] });
+        });
+    }
+
     fn render_from(
         &mut self,
         scene: &Scene,
@@ -88,5 +127,30 @@ impl Renderer {
             let first = band.first_row() * width;
             shader.fill(arch, scene, &projection, band, &mut values[first..first + band.rows() * width]);
         });
+    }
+}
+
+/// Depths of the pixels of a band.
+struct Depths<'a> {
+    band: &'a Band,
+    depths_m: &'a mut [f32],
+}
+
+impl WithSimd for Depths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { band, depths_m } = self;
+        for (row, depths_m) in depths_m.chunks_exact_mut(band.width().max(1)).enumerate() {
+            for (depths_m, block) in depths_m.chunks_mut(LANES).zip(band.row(row)) {
+                let mut all_m = [0.0; LANES];
+                for lane in 0..LANES {
+                    // One over nothing is infinite.
+                    all_m[lane] = 1.0 / block.inverse_depths[lane];
+                }
+                depths_m.copy_from_slice(&all_m[..depths_m.len()]);
+            }
+        }
     }
 }

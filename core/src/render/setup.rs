@@ -57,23 +57,24 @@ pub(super) fn prepare(
     let mut codes = [Code(0); TOGETHER];
     let count = triangles.len().min(TOGETHER);
     for (lane, &triangle) in triangles.iter().enumerate().take(TOGETHER) {
+        // One outside the scene is left without a volume.
+        let Some(position) = scene.positions().get(triangle as usize) else { continue };
         codes[lane] = scene.codes()[triangle as usize];
-        for (corner, position) in scene.positions()[triangle as usize].iter().enumerate() {
+        for (corner, position) in position.iter().enumerate() {
             for axis in 0..3 {
                 corners[corner][axis][lane] = f64::from(position[axis]);
             }
         }
     }
     let found = together(projection, &corners);
-    for lane in (0..count).filter(|&lane| found.shows[lane]) {
-        let lines = |range: [[i32; TOGETHER]; 2]| [range[0][lane], range[1][lane]];
-        let shown = lines(found.rows);
-        let shown = [shown[0].max(rows.start as i32), shown[1].min(rows.end as i32)];
-        if shown[0] < shown[1] {
-            let inverse_depth = found.inverse_depth.map(|lanes| lanes[lane]);
+    for lane in 0..count {
+        let shown = [found.rows[0][lane].max(rows.start as i32), found.rows[1][lane].min(rows.end as i32)];
+        if found.shows[lane] && shown[0] < shown[1] {
+            let inverse_depth =
+                [found.inverse_depth[0][lane], found.inverse_depth[1][lane], found.inverse_depth[2][lane]];
             let nearest = found.nearest[lane] as f32;
             let edges = found.edges_of(lane, projection.width, nearest.is_infinite());
-            let columns = lines(found.columns);
+            let columns = [found.columns[0][lane], found.columns[1][lane]];
             setups.push(Setup { code: codes[lane], nearest, rows: shown, columns, inverse_depth, edges });
         }
     }
@@ -92,11 +93,14 @@ fn together(projection: &Projection, corners: &[[Lanes; 3]; 3]) -> Together {
         shows: [false; TOGETHER],
     };
     for lane in 0..TOGETHER {
-        let [a, b, c] = [0, 1, 2].map(|k| projection.pixel(corners[k].map(|axis| axis[lane])));
+        let a = projection.pixel([corners[0][0][lane], corners[0][1][lane], corners[0][2][lane]]);
+        let b = projection.pixel([corners[1][0][lane], corners[1][1][lane], corners[1][2][lane]]);
+        let c = projection.pixel([corners[2][0][lane], corners[2][1][lane], corners[2][2][lane]]);
         let edges = [cross(b, c), cross(c, a), cross(a, b)];
         let volume = dot(a, edges[0]);
         let limit = FLAT * FLAT * dot(a, a) * dot(b, b) * dot(c, c);
-        for (k, edge) in edges.into_iter().enumerate() {
+        for k in 0..3 {
+            let edge = edges[k];
             for axis in 0..3 {
                 found.edges[k][axis][lane] = edge[axis];
             }
@@ -114,17 +118,15 @@ fn together(projection: &Projection, corners: &[[Lanes; 3]; 3]) -> Together {
             | (a[1] < 0.0) & (b[1] < 0.0) & (c[1] < 0.0)
             | (a[0] > projection.width * a[2]) & (b[0] > projection.width * b[2]) & (c[0] > projection.width * c[2])
             | (a[1] > projection.height * a[2]) & (b[1] > projection.height * b[2]) & (c[1] > projection.height * c[2]);
-        let sides = [(0, projection.width), (1, projection.height)].map(|(axis, size)| {
-            let at = [a[axis] / a[2], b[axis] / b[2], c[axis] / c[2]];
-            let low = first_centre(least(at[0], at[1], at[2]) - SLACK_PX, size);
-            let high = first_centre(most(at[0], at[1], at[2]) + SLACK_PX, size);
-            if passes { [0, size as i32] } else { [low, high] }
-        });
+        let columns = range([a[0] / a[2], b[0] / b[2], c[0] / c[2]], projection.width);
+        let rows = range([a[1] / a[2], b[1] / b[2], c[1] / c[2]], projection.height);
         for k in 0..2 {
-            found.columns[k][lane] = sides[0][k];
-            found.rows[k][lane] = sides[1][k];
+            let whole = if k == 0 { [0, 0] } else { [projection.width as i32, projection.height as i32] };
+            found.columns[k][lane] = if passes { whole[0] } else { columns[k] };
+            found.rows[k][lane] = if passes { whole[1] } else { rows[k] };
         }
-        found.shows[lane] = (volume * volume > limit) & (most_z >= NEAR_M) & !beyond & (sides[0][0] < sides[0][1]);
+        let covers = passes | (columns[0] < columns[1]);
+        found.shows[lane] = (volume * volume > limit) & (most_z >= NEAR_M) & !beyond & covers;
     }
     found
 }
@@ -136,16 +138,26 @@ impl Together {
         let mut edges = Edges::new(width);
         for k in 0..3 {
             // Shared edges have exactly opposite forms, so that their pixels fall to one side or the other.
-            let form = self.edges[k].map(|axis| if self.volume[lane] > 0.0 { axis[lane] } else { -axis[lane] });
-            edges.add(form, (self.lines[k][0][lane], self.lines[k][1][lane]));
+            let sign = if self.volume[lane] > 0.0 { 1.0 } else { -1.0 };
+            let form = &self.edges[k];
+            edges.add(
+                [form[0][lane] * sign, form[1][lane] * sign, form[2][lane] * sign],
+                (self.lines[k][0][lane], self.lines[k][1][lane]),
+            );
         }
         if passes {
-            let [x, y, z] = self.inverse_depth.map(|axis| -axis[lane]);
-            let z = z + 1.0 / NEAR_M;
+            let [x, y] = [-self.inverse_depth[0][lane], -self.inverse_depth[1][lane]];
+            let z = 1.0 / NEAR_M - self.inverse_depth[2][lane];
             edges.add([x, y, z], (-y / x, -z / x));
         }
         edges
     }
+}
+
+/// First and end of the pixels between three positions.
+#[inline(always)]
+fn range([a, b, c]: [f64; 3], size: f64) -> [i32; 2] {
+    [first_centre(least(a, b, c) - SLACK_PX, size), first_centre(most(a, b, c) + SLACK_PX, size)]
 }
 
 #[inline(always)]

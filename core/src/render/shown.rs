@@ -1,6 +1,6 @@
 //! Which triangles showed in an image: a good guess at what shows in the next.
 
-use super::band::{Band, LANES};
+use super::band::Band;
 use super::code::Code;
 
 /// Triangles that showed when it was last looked.
@@ -45,7 +45,7 @@ impl Shown {
         let mut last = 0;
         for blocks in (0..band.rows()).map(|row| band.row(row)) {
             for block in blocks {
-                if block.codes == [last; LANES] {
+                if block.is_all(Code(last)) {
                     continue;
                 }
                 for &code in &block.codes {

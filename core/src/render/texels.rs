@@ -7,7 +7,7 @@ use crate::mesh::{LabelTexture, Surface, Wrap};
 use resurvey_schema::ClassId;
 
 /// Pixels worked on at once, so that the compiler uses vector code for all but the look-up.
-const LANES: usize = 8;
+const LANES: usize = 16;
 /// Texture coordinates stay this share of their range, or of the texture, inside it: rounding at a rim does not wrap
 /// round to the other side.
 const INSET: f64 = 1e-6;
@@ -94,9 +94,21 @@ impl Texels {
                 let (_, row) = floor(wrapped(row, self.size[1]));
                 *texel = row.wrapping_mul(width).wrapping_add(column);
             }
-            for (pixel, texel) in chunk.iter_mut().zip(texels) {
-                *pixel = labels.get(texel as usize).copied().unwrap_or(ClassId::VOID.0);
+            let class = |texel: u32| labels.get(texel as usize).copied().unwrap_or(ClassId::VOID.0);
+            let mut differing = 0;
+            for lane in 1..LANES {
+                differing |= texels[lane] ^ texels[0];
             }
+            // Near the camera a texel covers many pixels.
+            let mut classes = [0; LANES];
+            if differing == 0 {
+                classes = [class(texels[0]); LANES];
+            } else {
+                for lane in 0..LANES {
+                    classes[lane] = class(texels[lane]);
+                }
+            }
+            chunk.copy_from_slice(&classes[..chunk.len()]);
         }
     }
 
