@@ -85,17 +85,27 @@ impl Band {
     }
 
     /// Draws a triangle's span in a row where it is nearer than what is there; among equals the one with the lower
-    /// index shows.
+    /// index shows. Blocks that `shows` does not pick are left as they are.
     #[inline(always)]
-    pub(super) fn draw<S: Simd>(&mut self, simd: S, row: usize, span: Span, code: Code) {
+    pub(super) fn draw<S: Simd>(
+        &mut self,
+        simd: S,
+        row: usize,
+        span: Span,
+        code: Code,
+        shows: &impl Fn(usize) -> bool,
+    ) {
         let Span { first, end, anchor, start, step } = span;
         let row = &mut self.blocks[row * self.blocks_per_row..(row + 1) * self.blocks_per_row];
         let (from, to) = (first as usize / LANES, (end as usize).div_ceil(LANES));
         let (lanes, lane_indices) = (S::as_simd_f32s(&LANE).0, S::as_simd_u32s(&LANE_INDEX).0);
         let (start, step, code) = (simd.splat_f32s(start), simd.splat_f32s(step), simd.splat_u32s(code.0));
         let length = simd.splat_u32s((end - first) as u32);
-        let mut column = (from * LANES) as i32;
-        for block in &mut row[from..to] {
+        for (index, block) in (from..to).zip(&mut row[from..to]) {
+            if !shows(index) {
+                continue;
+            }
+            let column = (index * LANES) as i32;
             let past = simd.splat_f32s(column as f32 - anchor);
             let inside = simd.splat_u32s((column - first) as u32);
             let nearest = S::as_mut_simd_f32s(&mut block.inverse_depths).0;
@@ -112,7 +122,6 @@ impl Band {
                 nearest[k] = simd.select_f32s(shows, inverse_depth, nearest[k]);
                 winner[k] = simd.select_u32s(shows, code, winner[k]);
             }
-            column += LANES as i32;
         }
     }
 }

@@ -55,6 +55,13 @@ impl Occlusion {
         }
     }
 
+    /// The tiles that row `v` of the image is in; none before anything was taken.
+    #[inline(always)]
+    pub(super) fn tiles(&self, v: i32) -> Tiles<'_> {
+        let row = tile(v - self.first_row as i32, self.rows.max(1));
+        Tiles { farthest: self.farthest.get(row * self.columns..(row + 1) * self.columns).unwrap_or_default() }
+    }
+
     /// Whether what lies between these columns and rows (of pixels of the image, first and end) and is no nearer than
     /// an inverse depth is behind what was taken, for certain.
     #[inline(always)]
@@ -75,6 +82,24 @@ impl Occlusion {
             }
         }
         true
+    }
+}
+
+/// A row of tiles.
+pub(super) struct Tiles<'a> {
+    farthest: &'a [f32],
+}
+
+impl Tiles<'_> {
+    /// Whether what is no nearer than an inverse depth is behind all of a block of pixels, for certain.
+    #[inline(always)]
+    pub(super) fn hide(&self, block: usize, nearest: f32) -> bool {
+        let nearest = nearest * (1.0 + CERTAIN);
+        let mut hidden = self.farthest.len() >= (block + 1) * ABREAST;
+        for farthest in self.farthest.iter().skip(block * ABREAST).take(ABREAST) {
+            hidden &= *farthest > nearest;
+        }
+        hidden
     }
 }
 

@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
 /// Rows of a band.
-const BAND_ROWS: usize = 6 * TILE;
+const BAND_ROWS: usize = 12 * TILE;
 /// Images from one look at what shows to the next.
 const LOOK_EVERY: u32 = 8;
 /// Triangles drawn in a band before it is looked at what they hide.
@@ -208,7 +208,7 @@ impl WithSimd for Draw<'_> {
             for setup in &setups[prepared.setups.start as usize..prepared.setups.end as usize] {
                 let rows = common(setup.rows, band_rows);
                 if rows[0] < rows[1] && !occlusion.hides(setup.columns, rows, setup.nearest) {
-                    paint(simd, band, setup, band_rows);
+                    paint_what_shows(simd, band, occlusion, setup, rows);
                     painted += 1;
                 }
             }
@@ -245,22 +245,50 @@ fn prepare_others(image: &Image, shown: &Shown, triangles: Range<usize>, setups:
 #[inline(always)]
 fn paint<S: Simd>(simd: S, band: &mut Band, setup: &Setup, band_rows: [i32; 2]) {
     let [first_row, end_row] = common(setup.rows, band_rows);
-    let [step, per_row, constant] = setup.inverse_depth;
     for row in (first_row..end_row).step_by(ROWS) {
-        let columns = setup.edges.columns(row);
-        let (mut anchors, mut starts) = ([0.0; ROWS], [0.0; ROWS]);
-        for k in 0..ROWS {
-            let y = f64::from(row) + 0.5 + k as f64;
-            let anchor = f64::from(if step >= 0.0 { columns.first[k] } else { columns.end[k] - 1 });
-            anchors[k] = anchor as f32;
-            starts[k] = (step * (anchor + 0.5) + (per_row * y + constant)) as f32;
+        paint_rows(simd, band, setup, [row, end_row.min(row + ROWS as i32)], |_| true);
+    }
+}
+
+/// The same, without the tiles in which all of it is hidden.
+#[inline(always)]
+fn paint_what_shows<S: Simd>(simd: S, band: &mut Band, occlusion: &Occlusion, setup: &Setup, rows: [i32; 2]) {
+    let mut row = rows[0];
+    while row < rows[1] {
+        // Bands begin at a row of tiles, and a row of tiles is as high as rows are worked on at once.
+        let end = rows[1].min(row + ROWS as i32 - (row - band.first_row() as i32) % TILE as i32);
+        if !occlusion.hides(setup.columns, [row, end], setup.nearest) {
+            let tiles = occlusion.tiles(row);
+            paint_rows(simd, band, setup, [row, end], |block| !tiles.hide(block, setup.nearest));
         }
-        for k in 0..ROWS.min((end_row - row) as usize) {
-            let (first, end) = (columns.first[k], columns.end[k]);
-            if first < end {
-                let span = Span { first, end, anchor: anchors[k], start: starts[k], step: step as f32 };
-                band.draw(simd, (row - band_rows[0]) as usize + k, span, setup.code);
-            }
+        row = end;
+    }
+}
+
+/// Draws up to [`ROWS`] rows of a triangle, in the blocks that `shows` picks.
+#[inline(always)]
+fn paint_rows<S: Simd>(
+    simd: S,
+    band: &mut Band,
+    setup: &Setup,
+    [first_row, end_row]: [i32; 2],
+    shows: impl Fn(usize) -> bool,
+) {
+    let [step, per_row, constant] = setup.inverse_depth;
+    let columns = setup.edges.columns(first_row);
+    let (mut anchors, mut starts) = ([0.0; ROWS], [0.0; ROWS]);
+    for k in 0..ROWS {
+        let y = f64::from(first_row) + 0.5 + k as f64;
+        let anchor = f64::from(if step >= 0.0 { columns.first[k] } else { columns.end[k] - 1 });
+        anchors[k] = anchor as f32;
+        starts[k] = (step * (anchor + 0.5) + (per_row * y + constant)) as f32;
+    }
+    let row_in_band = first_row as usize - band.first_row();
+    for k in 0..(end_row - first_row) as usize {
+        let (first, end) = (columns.first[k], columns.end[k]);
+        if first < end {
+            let span = Span { first, end, anchor: anchors[k], start: starts[k], step: step as f32 };
+            band.draw(simd, row_in_band + k, span, setup.code, &shows);
         }
     }
 }

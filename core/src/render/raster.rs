@@ -40,7 +40,7 @@ impl Renderer {
         Self::with(Arch::Scalar)
     }
 
-    fn with(arch: Arch) -> Self {
+    pub(super) fn with(arch: Arch) -> Self {
         Self { painter: Painter::new(arch), shader: Shader::default() }
     }
 

@@ -130,6 +130,49 @@ fn leaving_out_what_is_hidden_changes_no_pixel() {
 }
 
 #[test]
+fn every_instruction_set_and_every_history_gives_the_same_image() {
+    let mut archs = vec![pulp::Arch::Scalar, pulp::Arch::new()];
+    #[cfg(target_arch = "x86_64")]
+    archs.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
+    let mut drawn = archs.iter().map(|arch| Renderer::with(*arch)).collect::<Vec<_>>();
+    for seed in 0..4 {
+        // Two triangles in the same place: of these the one with the lower index shows, whatever is drawn first.
+        let mut objects = clutter(seed);
+        objects.push(quad([[-4.0, 9.0, -1.0], [4.0, 9.0, -1.0], [4.0, 9.0, 3.0], [-4.0, 9.0, 3.0]], class(2)));
+        objects.push(quad([[4.0, 9.0, -1.0], [-4.0, 9.0, -1.0], [-4.0, 9.0, 3.0], [4.0, 9.0, 3.0]], class(17)));
+        let scene = scene(&objects);
+        let pinhole = camera().pinhole().unwrap();
+        for step in 0..24 {
+            let here = pose([0.2, f64::from(step) * 0.1, 0.5], f64::from(step) * 7.0, 3.0);
+            let mut expected = LabelImage::filled(1, 1, 0);
+            Renderer::baseline().render_labels(&scene, &pinhole, &here, &mut expected);
+            for renderer in &mut drawn {
+                let mut found = LabelImage::filled(1, 1, 0);
+                renderer.render_labels(&scene, &pinhole, &here, &mut found);
+                assert!(found == expected, "seed {seed}, step {step}");
+                let mut depths_m = crate::image::Raster::filled(1, 1, 0.0);
+                renderer.render_labels_and_depths(&scene, &pinhole, &here, (&mut found, &mut depths_m));
+                assert!(found == expected, "seed {seed}, step {step}");
+            }
+            assert!(view(&scene, &camera(), &here).labels == expected, "seed {seed}, step {step}");
+        }
+    }
+}
+
+#[test]
+fn depths_are_those_along_the_optical_axis() {
+    let scene = scene(&[wall(8.0, [-2.0, 2.0], [-1.0, 3.0], class(0))]);
+    let (mut labels, mut depths_m) = (LabelImage::filled(1, 1, 0), crate::image::Raster::filled(1, 1, 0.0));
+    let here = pose([0.0; 3], 0.0, 0.0);
+    Renderer::new().render_labels_and_depths(&scene, &camera().pinhole().unwrap(), &here, (&mut labels, &mut depths_m));
+    for (class, depth_m) in labels.values().iter().zip(depths_m.values()) {
+        let expected_m = if *class == SKY { f32::INFINITY } else { 8.0 };
+        assert!((depth_m - expected_m).abs() < 1e-5 || *depth_m >= expected_m, "{depth_m} m");
+    }
+    assert_eq!(labels.at(64, 40), 0);
+}
+
+#[test]
 fn a_distorted_camera_without_distortion_sees_what_a_pinhole_sees() {
     let scene = scene(&clutter(3));
     let here = pose([0.5, 0.5, 0.5], 33.0, 4.0);
