@@ -51,7 +51,7 @@ fn world() -> World {
 fn camera() -> Camera {
     let (width, height, model) = (100, 72, CameraModel::Pinhole);
     let (fx, fy, cx, cy) = (60.0, 60.0, 50.0, 36.0);
-    Camera::new(Intrinsics { model, width, height, fx, fy, cx, cy, distortion: [0.0; 5] }).unwrap()
+    Camera::new(Intrinsics { model, width, height, fx, fy, cx, cy, distortion: [0.0; 5] }).expect("a valid camera")
 }
 
 fn truth() -> Pose {
@@ -108,7 +108,7 @@ fn cast(scene: &Scene, caster: &RayCaster, pose: &Pose) -> LabelImage {
     let map_from_camera = world_from_camera(pose);
     let mut labels = LabelImage::filled(camera.width(), camera.height(), scene.sky().0);
     for (u, v) in (0..camera.height()).flat_map(|v| (0..camera.width()).map(move |u| (u, v))) {
-        let ray = camera.ray(f64::from(u) + 0.5, f64::from(v) + 0.5).unwrap();
+        let ray = camera.ray(f64::from(u) + 0.5, f64::from(v) + 0.5).expect("a pinhole has a ray everywhere");
         if let Some(hit) = caster.cast(pose.position, (map_from_camera * ray).into(), f64::INFINITY) {
             labels.set(u, v, hit.class.0);
         }

@@ -137,31 +137,81 @@ impl Bits {
         }
     }
 
-    /// Ones within a disk of a one; `wide` and `spare` are scratch space of the same size.
+    /// Calls `found` with each row that has a one in `where_ones`, and that row of the disks around the ones of `self`:
+    /// index of its first word and its words, past the border of the image undefined. `wide` is scratch space.
     #[inline(always)]
-    pub(super) fn dilated_into(&self, disk: &Disk, out: &mut Self, [wide, spare]: [&mut Self; 2]) {
+    pub(super) fn dilate(
+        &self,
+        disk: &Disk,
+        where_ones: &Self,
+        wide: &mut Vec<Self>,
+        mut found: impl FnMut(usize, &[u64]),
+    ) {
         let row = self.size.words_per_row();
-        out.clear();
-        wide.words.copy_from_slice(&self.words);
-        let mut done = 0;
-        for &(dv, half) in &disk.rows {
-            while done < half {
-                let step = (half - done).min(done.max(1)).min(WORD - 1);
-                wide.spread_into(step, spare);
-                std::mem::swap(&mut wide.words, &mut spare.words);
-                done += step;
+        self.widen(disk, wide);
+        let mut whole = vec![0; row];
+        for v in 0..self.size.height {
+            let first = self.size.row(v);
+            let mut any = 0;
+            for word in &where_ones.words[first..first + row] {
+                any |= word;
             }
-            if dv >= self.size.height {
+            if any == 0 {
                 continue;
             }
-            let (first, end) = (self.size.row(0), self.size.row(self.size.height));
-            let shift = dv * row;
-            // What is above and below the image is nobody's.
-            let (to, from) = (&mut out.words[first..end - shift], &wide.words[first + shift..end]);
-            to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
-            let (to, from) = (&mut out.words[first + shift..end], &wide.words[first..end - shift]);
-            to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
+            whole.fill(0);
+            for &(dv, width) in &disk.rows {
+                if v + dv < self.size.height {
+                    add_row(&mut whole, &wide[width].words[first + dv * row..]);
+                }
+                if dv > 0 && dv <= v {
+                    add_row(&mut whole, &wide[width].words[first - dv * row..]);
+                }
+            }
+            found(first, &whole);
         }
+    }
+
+    /// Makes `wide[i]` the ones of `self` widened along rows by the disk's width number i.
+    #[inline(always)]
+    fn widen(&self, disk: &Disk, wide: &mut Vec<Self>) {
+        // The last one is spare.
+        wide.resize(disk.widths.len() + 1, Self::new(self.size));
+        let mut done = 0;
+        for (index, &half) in disk.widths.iter().enumerate() {
+            let (narrower, rest) = wide.split_at_mut(index);
+            let (this, spare) = rest.split_at_mut(1);
+            let Some(spare) = spare.last_mut() else { return };
+            this[0].words.copy_from_slice(&narrower.last().unwrap_or(self).words);
+            while done < half {
+                let step = (half - done).min(done.max(1)).min(WORD - 1);
+                this[0].spread_into(step, spare);
+                std::mem::swap(&mut this[0].words, &mut spare.words);
+                done += step;
+            }
+        }
+    }
+
+    /// Ones within a disk of a one, where `where_ones` has ones.
+    pub(super) fn dilated(&self, disk: &Disk, where_ones: &Self) -> Self {
+        let mut out = Self::new(self.size);
+        self.dilate(disk, where_ones, &mut Vec::new(), |first, row| {
+            out.words[first..first + row.len()].copy_from_slice(row);
+        });
+        out.and(where_ones);
+        out
+    }
+
+    /// How many ones of `of` lie within a disk of a one of `self`; `wide` is scratch space.
+    #[inline(always)]
+    pub(super) fn count_near(&self, disk: &Disk, of: &Self, wide: &mut Vec<Self>) -> u32 {
+        let mut count = 0;
+        self.dilate(disk, of, wide, |first, row| {
+            for (a, b) in row.iter().zip(&of.words[first..]) {
+                count += (a & b).count_ones();
+            }
+        });
+        count
     }
 
     /// ORs all rows with themselves shifted by `step` (1–63) pixels to both sides.
@@ -181,10 +231,19 @@ impl Bits {
     }
 }
 
+#[inline(always)]
+fn add_row(to: &mut [u64], from: &[u64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to |= from;
+    }
+}
+
 /// The pixels whose centres lie within a radius of a centre.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Disk {
-    /// Distance of a row of it from its middle, and how far it reaches along that row, narrowest first.
+    /// How far its rows reach to either side, each width once, narrowest first.
+    widths: Vec<usize>,
+    /// Distance of a row of it from its middle, and the number of that row's width.
     rows: Vec<(usize, usize)>,
 }
 
@@ -192,7 +251,10 @@ impl Disk {
     pub(super) fn new(radius_px: f64) -> Self {
         let reach = radius_px.max(0.0).floor() as usize;
         let half = |dv: usize| (radius_px * radius_px - (dv * dv) as f64).max(0.0).sqrt().floor() as usize;
-        Self { rows: (0..=reach).rev().map(|dv| (dv, half(dv))).collect() }
+        let mut widths: Vec<usize> = (0..=reach).rev().map(half).collect();
+        widths.dedup();
+        let row = |dv: usize| (dv, widths.partition_point(|&width| width < half(dv)));
+        Self { rows: (0..=reach).map(row).collect(), widths }
     }
 }
 
@@ -235,10 +297,8 @@ mod tests {
                 }
             }
             let whole = Bits::from_pixels(size, &values, |_| true);
-            let (mut found, mut wide, mut spare) = (Bits::new(size), Bits::new(size), Bits::new(size));
-            ones(&values).dilated_into(&Disk::new(radius), &mut found, [&mut wide, &mut spare]);
-            found.and(&whole);
-            prop_assert_eq!(&found, &ones(&dilated));
+            prop_assert_eq!(&ones(&values).dilated(&Disk::new(radius), &whole), &ones(&dilated));
+            let mut found = Bits::new(size);
             ones(&values).boundary_into(&whole, &mut found);
             prop_assert_eq!(&found, &ones(&boundary));
         }

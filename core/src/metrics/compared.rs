@@ -45,7 +45,8 @@ pub struct ViewPlanes {
     arch: Arch,
     planes: Vec<Bits>,
     known: Bits,
-    scratch: [Bits; 4],
+    boundary: Bits,
+    wide: Vec<Bits>,
 }
 
 impl ComparedPhoto {
@@ -72,8 +73,7 @@ impl ComparedPhoto {
             if let Some(Boundaries { disk, whole, compared }) = &boundaries {
                 all.boundary_into(whole, &mut boundary);
                 boundary.and(compared);
-                let (mut wide, mut spare) = (Bits::new(size), Bits::new(size));
-                boundary.dilated_into(disk, &mut near_boundary, [&mut wide, &mut spare]);
+                near_boundary = boundary.dilated(disk, whole);
             }
             let pixels = if compared(class as u8) { all } else { Bits::new(size) };
             PhotoClass { count: pixels.count(), boundary_count: boundary.count(), pixels, boundary, near_boundary }
@@ -91,7 +91,7 @@ impl ComparedPhoto {
     fn planes_for(&self, arch: Arch) -> ViewPlanes {
         let blank = Bits::new(self.size);
         let planes = vec![blank.clone(); self.classes.len()];
-        ViewPlanes { arch, planes, known: blank.clone(), scratch: [0; 4].map(|_| blank.clone()) }
+        ViewPlanes { arch, planes, known: blank.clone(), boundary: blank, wide: Vec::new() }
     }
 
     /// Sets the counts of the view in `planes`, class by class.
@@ -157,7 +157,7 @@ impl WithSimd for Count<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { photo, planes: ViewPlanes { planes, known, scratch, .. }, counts } = self;
+        let Self { photo, planes: ViewPlanes { planes, known, boundary, wide, .. }, counts } = self;
         known.clear();
         for (class, plane) in planes.iter().enumerate() {
             if !photo.ignored_in_view.contains(ClassId(class as u8)) {
@@ -178,7 +178,7 @@ impl WithSimd for Count<'_> {
                 count.both = photo_class.pixels.count_and(plane);
             }
             if let Some(boundaries) = &photo.boundaries {
-                count_boundaries(boundaries, photo_class, plane, scratch, count);
+                count_boundaries(boundaries, photo_class, plane, (boundary, wide), count);
             }
         }
     }
@@ -189,7 +189,7 @@ fn count_boundaries(
     boundaries: &Boundaries,
     photo: &PhotoClass,
     view: &Bits,
-    [boundary, near, wide, spare]: &mut [Bits; 4],
+    (boundary, wide): (&mut Bits, &mut Vec<Bits>),
     count: &mut ClassCounts,
 ) {
     view.boundary_into(&boundaries.whole, boundary);
@@ -198,8 +198,7 @@ fn count_boundaries(
     count.view_boundary = boundary.count();
     if count.photo_boundary > 0 && count.view_boundary > 0 {
         count.view_boundary_matched = boundary.count_and(&photo.near_boundary);
-        boundary.dilated_into(&boundaries.disk, near, [wide, spare]);
-        count.photo_boundary_matched = photo.boundary.count_and(near);
+        count.photo_boundary_matched = boundary.count_near(&boundaries.disk, &photo.boundary, wide);
     }
 }
 

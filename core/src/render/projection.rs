@@ -1,4 +1,5 @@
 //! From the scene's offsets to homogeneous pixels.
+#![allow(clippy::needless_range_loop, reason = "lanes and axes: plain loops become vector code")]
 
 use super::hierarchy::Bounds;
 use super::scene::Scene;

@@ -145,9 +145,9 @@ impl WithSimd for Depths<'_> {
         for (row, depths_m) in depths_m.chunks_exact_mut(band.width().max(1)).enumerate() {
             for (depths_m, block) in depths_m.chunks_mut(LANES).zip(band.row(row)) {
                 let mut all_m = [0.0; LANES];
-                for lane in 0..LANES {
+                for (depth_m, inverse_depth) in all_m.iter_mut().zip(&block.inverse_depths) {
                     // One over nothing is infinite.
-                    all_m[lane] = 1.0 / block.inverse_depths[lane];
+                    *depth_m = 1.0 / inverse_depth;
                 }
                 depths_m.copy_from_slice(&all_m[..depths_m.len()]);
             }

@@ -1,5 +1,6 @@
 //! What a triangle needs to be drawn: its edges and its inverse depth as linear functions of the pixel (Olano & Greer
 //! 1997).
+#![allow(clippy::needless_range_loop, reason = "lanes and axes: plain loops become vector code")]
 
 use super::code::Code;
 use super::edges::{Edges, first_centre};

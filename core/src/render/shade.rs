@@ -141,7 +141,8 @@ impl Shader {
                 let run = Code(code(start));
                 let mut end = start + 1;
                 while end < band.width() && code(end) == run.0 {
-                    let whole = end % LANES == 0 && end + LANES <= band.width() && blocks[end / LANES].is_all(run);
+                    let whole =
+                        end.is_multiple_of(LANES) && end + LANES <= band.width() && blocks[end / LANES].is_all(run);
                     end += if whole { LANES } else { 1 };
                 }
                 self.look_up_run(scene, projection, run, [start, band.first_row() + row], &mut pixels[start..end]);
