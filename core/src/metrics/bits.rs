@@ -1,6 +1,6 @@
 //! One-bit images, 64 pixels a word: boundaries and disk dilation in a few operations a word.
 //!
-//! Every row ends with a word of zeros, and so do the image and its top: neighbours of a word are the words before and
+//! Every row ends with a word of zeros or more, and so do the image and its top: neighbours of a word are the words before and
 //! after it and those one row away, at the border too.
 
 use crate::image::mask;
@@ -8,6 +8,9 @@ use pulp::Simd;
 
 /// Pixels in a word.
 pub(super) const WORD: usize = 64;
+
+/// Words worked on at once; rows are padded to whole groups.
+const GROUP: usize = 8;
 
 /// Size of a binary image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +32,7 @@ impl Size {
     }
 
     fn words_per_row(self) -> usize {
-        self.width.div_ceil(WORD) + 1
+        (self.width.div_ceil(WORD) + 1).next_multiple_of(GROUP)
     }
 
     /// Index of the first word of row `v`.
@@ -137,38 +140,40 @@ impl Bits {
         }
     }
 
-    /// Calls `found` with each row that has a one in `where_ones`, and that row of the disks around the ones of `self`:
-    /// index of its first word and its words, past the border of the image undefined. `wide` is scratch space.
+    /// Index of every group of words in which `where_ones` has ones, and the disks around the ones of `self` there; past
+    /// the border of the image undefined. `wide` is scratch space.
     #[inline(always)]
-    pub(super) fn dilate(
+    fn dilate(
         &self,
         disk: &Disk,
         where_ones: &Self,
         wide: &mut Vec<Self>,
-        mut found: impl FnMut(usize, &[u64]),
+        mut found: impl FnMut(usize, &[u64; GROUP]),
     ) {
         let row = self.size.words_per_row();
         self.widen(disk, wide);
-        let mut whole = vec![0; row];
         for v in 0..self.size.height {
             let first = self.size.row(v);
-            let mut any = 0;
-            for word in &where_ones.words[first..first + row] {
-                any |= word;
-            }
-            if any == 0 {
-                continue;
-            }
-            whole.fill(0);
-            for &(dv, width) in &disk.rows {
-                if v + dv < self.size.height {
-                    add_row(&mut whole, &wide[width].words[first + dv * row..]);
+            for start in (first..first + row).step_by(GROUP) {
+                let mut any = 0;
+                for word in &where_ones.words[start..start + GROUP] {
+                    any |= word;
                 }
-                if dv > 0 && dv <= v {
-                    add_row(&mut whole, &wide[width].words[first - dv * row..]);
+                if any == 0 {
+                    continue;
                 }
+                let mut group = [0; GROUP];
+                for &(dv, width) in &disk.rows {
+                    let words = &wide[width].words;
+                    if v + dv < self.size.height {
+                        add(&mut group, &words[start + dv * row..start + dv * row + GROUP]);
+                    }
+                    if dv > 0 && dv <= v {
+                        add(&mut group, &words[start - dv * row..start - dv * row + GROUP]);
+                    }
+                }
+                found(start, &group);
             }
-            found(first, &whole);
         }
     }
 
@@ -182,7 +187,14 @@ impl Bits {
             let (narrower, rest) = wide.split_at_mut(index);
             let (this, spare) = rest.split_at_mut(1);
             let Some(spare) = spare.last_mut() else { return };
-            this[0].words.copy_from_slice(&narrower.last().unwrap_or(self).words);
+            let source = narrower.last().unwrap_or(self);
+            let step = half - done;
+            if step == 1 {
+                source.spread_into(step, &mut this[0]);
+                done = half;
+            } else {
+                this[0].words.copy_from_slice(&source.words);
+            }
             while done < half {
                 let step = (half - done).min(done.max(1)).min(WORD - 1);
                 this[0].spread_into(step, spare);
@@ -195,8 +207,8 @@ impl Bits {
     /// Ones within a disk of a one, where `where_ones` has ones.
     pub(super) fn dilated(&self, disk: &Disk, where_ones: &Self) -> Self {
         let mut out = Self::new(self.size);
-        self.dilate(disk, where_ones, &mut Vec::new(), |first, row| {
-            out.words[first..first + row.len()].copy_from_slice(row);
+        self.dilate(disk, where_ones, &mut Vec::new(), |start, group| {
+            out.words[start..start + GROUP].copy_from_slice(group);
         });
         out.and(where_ones);
         out
@@ -206,8 +218,8 @@ impl Bits {
     #[inline(always)]
     pub(super) fn count_near(&self, disk: &Disk, of: &Self, wide: &mut Vec<Self>) -> u32 {
         let mut count = 0;
-        self.dilate(disk, of, wide, |first, row| {
-            for (a, b) in row.iter().zip(&of.words[first..]) {
+        self.dilate(disk, of, wide, |start, group| {
+            for (a, b) in group.iter().zip(&of.words[start..start + GROUP]) {
                 count += (a & b).count_ones();
             }
         });
@@ -227,12 +239,13 @@ impl Bits {
             out[k] = x[k] | x[k] << step | left[k] >> back | x[k] >> step | right[k] << back;
         }
         // What leaves a row does not enter the next.
-        out.iter_mut().skip(row - 1).step_by(row).for_each(|word| *word = 0);
+        let used = self.size.width.div_ceil(WORD);
+        out.chunks_exact_mut(row).for_each(|row| row[used] = 0);
     }
 }
 
 #[inline(always)]
-fn add_row(to: &mut [u64], from: &[u64]) {
+fn add(to: &mut [u64; GROUP], from: &[u64]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to |= from;
     }
