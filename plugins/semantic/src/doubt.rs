@@ -6,8 +6,11 @@ use crate::settings::Settings;
 use resurvey_plugin::Error;
 use resurvey_plugin::schema::{Pose, RunnerUp};
 
+/// Over easting (m), northing (m) and yaw (rad).
+pub type Covariance = [[f64; 3]; 3];
+
 /// Modes closer than this are the same answer, metres.
-const SAME_PLACE_M: f64 = 5.0;
+pub const SAME_PLACE_M: f64 = 5.0;
 /// Poses drawn around the best in each round.
 const SAMPLES: usize = 192;
 /// Half-widths of the box that poses are drawn from, in the first round: metres and radians.
@@ -23,7 +26,7 @@ const FLOOR: [f64; 3] = [0.02, 0.02, 0.0005];
 pub fn covariance(
     best: &Mode,
     mut evaluate: impl FnMut(&[Pose]) -> Result<Vec<Mode>, Error>,
-) -> Result<[[f64; 3]; 3], Error> {
+) -> Result<Covariance, Error> {
     let mut reach = FIRST_REACH;
     let mut moments = Moments::default();
     for _ in 0..MAX_ROUNDS {
@@ -39,11 +42,15 @@ pub fn covariance(
         }
         reach = reach.map(|half| half * 0.6);
     }
-    let mut covariance = moments.covariance;
+    Ok(with_floor(moments.covariance))
+}
+
+/// `covariance` plus what the grid of label pixels leaves open.
+pub fn with_floor(mut covariance: Covariance) -> Covariance {
     for (axis, floor) in FLOOR.iter().enumerate() {
         covariance[axis][axis] += floor * floor;
     }
-    Ok(covariance)
+    covariance
 }
 
 /// The best mode more than 5 m from the first; `modes` are sorted best first.

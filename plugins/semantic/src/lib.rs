@@ -1,16 +1,24 @@
 //! VPS matcher on semantic labels (Lee & Hsu, §3.4): every position and heading around the prior is compared on
-//! panoramas, the best modes are refined on perspective views, and the spread of the likelihood says how sure it is.
+//! panoramas, the best modes are refined on perspective views, the best of these is aligned by its contours, and what
+//! stays between the contours of photo and map says how sure it is.
 #![forbid(unsafe_code)]
 
+mod align;
 mod candidates;
 mod doubt;
+mod edges;
 mod likeness;
+mod mixed;
 mod mode;
+mod parts;
 mod refine;
 mod settings;
 
+use align::Alignment;
+use candidates::Sweep;
 use likeness::{Compared, Likeness};
-use resurvey_plugin::schema::Localization;
+use refine::Objective;
+use resurvey_plugin::schema::{ClassId, Localization};
 use resurvey_plugin::{Error, Host, Photo, Plugin, Searcher};
 pub use settings::Settings;
 
@@ -35,29 +43,47 @@ impl Plugin for Semantic {
 
 impl Searcher for Semantic {
     fn search(&mut self, host: &dyn Host, photo: &Photo<'_>) -> Result<Localization, Error> {
-        let compared = Compared::new(host.classes(), &self.settings);
-        let likeness = Likeness::new(&self.settings);
-        let coarse = candidates::sweep(host, photo, &self.settings, &compared, &likeness)?;
-        let mut modes = candidates::distinct_modes(&coarse, &self.settings);
+        let settings = &self.settings;
+        let compared = Compared::new(host.classes(), settings);
+        if !photo_has(photo, &compared) {
+            return Err(Error(
+                "nothing in the photo can be compared: every pixel is void or of a class left out".into(),
+            ));
+        }
+        let likeness = Likeness::new(settings);
+        let sweep = Sweep { host, photo, settings, compared: &compared, likeness: &likeness };
+        let coarse = sweep.run()?;
+        let mut modes = candidates::modes(&coarse, settings);
         if modes.is_empty() {
-            let (skipped, radius_m) = (coarse.skipped, self.settings.radius_m);
+            let (skipped, radius_m) = (coarse.skipped, sweep.radius_m());
             return Err(Error(format!(
                 "no candidate within {radius_m} m of the prior: {skipped} lie inside buildings; check the prior's position"
             )));
         }
-        let objective = refine::Objective { host, photo, settings: &self.settings, compared: &compared, likeness };
-        let refined =
-            if self.settings.refine { objective.refine(&mut modes)? } else { objective.rescore(&mut modes)? };
-        let covariance = objective.covariance(&refined)?;
-        let best = &modes[0];
+        let objective = Objective { host, photo, settings, compared: &compared, likeness };
+        let alignment = Alignment { host, photo, compared: &compared, use_prior: settings.use_prior };
+        let (best, covariance) = if settings.refine {
+            objective.refine(&mut modes)?;
+            let (best, aligned) = alignment.best_of(&objective, &mut modes)?;
+            let spread = aligned.map(|covariance| Ok(doubt::with_floor(covariance)));
+            (best, spread.unwrap_or_else(|| objective.covariance(&best))?)
+        } else {
+            let best = objective.rescore(&mut modes)?;
+            (best, objective.covariance(&best)?)
+        };
         Ok(Localization {
             pose: best.pose,
             score: best.score.clamp(0.0, 1.0),
             covariance,
-            runner_up: doubt::runner_up(&modes, &self.settings),
+            runner_up: doubt::runner_up(&modes, settings),
             candidates: coarse.scored,
             skipped: coarse.skipped,
             heat: coarse.heat,
         })
     }
+}
+
+fn photo_has(photo: &Photo<'_>, compared: &Compared) -> bool {
+    let rows = 0..photo.labels.height();
+    rows.flat_map(|v| photo.labels.row(v)).any(|&class| compared.in_photo(ClassId(class)))
 }

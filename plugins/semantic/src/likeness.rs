@@ -1,7 +1,7 @@
 //! One number from the counts of all classes: how alike photo and view are.
 
 use crate::settings::{ClassWeights, Settings};
-use resurvey_plugin::schema::{ClassKind, ClassTable};
+use resurvey_plugin::schema::{ClassId, ClassKind, ClassTable};
 use resurvey_plugin::{ClassCounts, ClassSet, score};
 
 /// Which classes are left out of the comparison because the map cannot know them.
@@ -26,6 +26,16 @@ impl Compared {
         }
         let classes = table.iter().map(|class| usize::from(class.index.0) + 1).max().unwrap_or(0);
         Self { ignored_in_photo: ignored, ignored_in_view: ClassSet::default(), classes }
+    }
+
+    /// Whether a pixel of the photo with this class takes part.
+    pub fn in_photo(&self, class: ClassId) -> bool {
+        class != ClassId::VOID && !self.ignored_in_photo.contains(class)
+    }
+
+    /// Whether a pixel of the view with this class takes part.
+    pub fn in_view(&self, class: ClassId) -> bool {
+        class != ClassId::VOID && !self.ignored_in_view.contains(class)
     }
 }
 
@@ -87,9 +97,14 @@ impl Likeness {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::settings::tests::defaults;
+
+    /// Everything is compared.
+    pub(crate) fn nothing_ignored() -> Compared {
+        Compared { ignored_in_photo: ClassSet::default(), ignored_in_view: ClassSet::default(), classes: 9 }
+    }
 
     fn counts(values: [(u32, u32, u32); 2]) -> Vec<ClassCounts> {
         values.map(|(photo, view, both)| ClassCounts { photo, view, both, ..ClassCounts::default() }).to_vec()

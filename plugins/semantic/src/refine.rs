@@ -33,11 +33,12 @@ struct Level {
     modes: usize,
 }
 
-const LEVELS: [Level; 3] = [
+const LEVELS: [Level; 2] = [
     Level { samples: 120, first_step: 1.0, last_step: 0.2, modes: usize::MAX },
     Level { samples: 240, first_step: 0.5, last_step: 0.08, modes: 6 },
-    Level { samples: 480, first_step: 0.2, last_step: 0.02, modes: 2 },
 ];
+/// Samples of the view that gives the final score.
+const FINEST: u32 = 480;
 /// Full step of position and height, metres.
 const STEP_M: f64 = 0.5;
 /// Full step of heading, pitch and roll, radians.
@@ -48,11 +49,11 @@ const PIVOTS_M: [f64; 2] = [8.0, 30.0];
 const MAX_ROUNDS: usize = 60;
 
 /// A move in the camera's own axes: right, forward, up in metres; yaw, pitch, roll in radians.
-type Move = [f64; 6];
+pub type Move = [f64; 6];
 
 impl Objective<'_, '_> {
-    /// Refines `modes` in place, sorts them best first, and returns what the covariance needs.
-    pub fn refine(&self, modes: &mut [Mode]) -> Result<Mode, Error> {
+    /// Refines `modes` in place and sorts them best first.
+    pub fn refine(&self, modes: &mut [Mode]) -> Result<(), Error> {
         for (index, level) in LEVELS.iter().enumerate() {
             let stride = self.stride(level.samples);
             for mode in modes.iter_mut().take(level.modes) {
@@ -64,16 +65,22 @@ impl Objective<'_, '_> {
             modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
             self.host.progress(0.6 + 0.4 * (index + 1) as f64 / LEVELS.len() as f64);
         }
-        Ok(modes[0])
+        Ok(())
     }
 
-    /// Scores `modes` as they stand on the finest views and sorts them best first.
+    /// Scores `modes` as they stand on views of the photo's full size and sorts them best first.
     pub fn rescore(&self, modes: &mut [Mode]) -> Result<Mode, Error> {
         let poses: Vec<Pose> = modes.iter().map(|mode| mode.pose).collect();
-        let scored = self.evaluate(self.stride(480), &poses)?;
+        let scored = self.evaluate(1, &poses)?;
         modes.copy_from_slice(&scored);
         modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
         Ok(modes[0])
+    }
+
+    /// Score and log posterior of `pose` on a fine view.
+    pub fn at(&self, pose: Pose) -> Result<Mode, Error> {
+        let scored = self.evaluate(self.stride(FINEST), &[pose])?;
+        scored.first().copied().ok_or_else(|| Error("the host compared no view".to_owned()))
     }
 
     /// Spread of the likelihood around `best`.
@@ -130,13 +137,11 @@ impl Objective<'_, '_> {
 
     /// Score and log posterior of each pose.
     fn evaluate(&self, stride: u32, poses: &[Pose]) -> Result<Vec<Mode>, Error> {
-        let boundary_tolerance_px =
-            if self.settings.needs_boundaries() { self.settings.boundary_tolerance_px } else { 0.0 };
         let request = CompareRequest {
             stride,
             ignored_in_photo: self.compared.ignored_in_photo,
             ignored_in_view: self.compared.ignored_in_view,
-            boundary_tolerance_px,
+            boundary_tolerance_px: self.settings.tolerance_px(),
         };
         let counts = self.host.compare_views(&request, poses)?;
         let modes = poses.iter().zip(&counts).map(|(pose, counts)| {

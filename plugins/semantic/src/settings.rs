@@ -11,6 +11,8 @@ pub struct Settings {
     pub spacing_m: f64,
     pub yaw_range_deg: f64,
     pub yaw_step_deg: u32,
+    pub widen: bool,
+    pub exhaustive: bool,
     pub dice: f64,
     pub jaccard: f64,
     pub boundary_f1: f64,
@@ -47,20 +49,28 @@ pub enum ClassWeights {
 }
 
 impl Settings {
-    /// The settings with the profile's choices put in.
+    /// The settings with the profile's choices put in; weights that are given stay.
     pub fn resolved(mut self) -> Self {
+        let mut own = [1.0, 0.0, 0.0, 0.0];
         if self.profile == Profile::Paper {
-            (self.dice, self.jaccard, self.boundary_f1, self.agreement) = (1.0, 1.0, 1.0, 0.0);
+            own = [1.0, 1.0, 1.0, 0.0];
             self.class_weights = ClassWeights::Equal;
             (self.ignore_dynamic, self.ignore_foliage, self.refine, self.use_prior) = (false, false, false, false);
+            self.widen = false;
             self.modes = self.modes.max(100);
+        }
+        let weights = [&mut self.dice, &mut self.jaccard, &mut self.boundary_f1, &mut self.agreement];
+        for (weight, own) in weights.into_iter().zip(own) {
+            if *weight < 0.0 {
+                *weight = own;
+            }
         }
         self
     }
 
-    /// Whether views, not panoramas, are needed for the score.
-    pub fn needs_boundaries(&self) -> bool {
-        self.boundary_f1 > 0.0
+    /// Tolerance of the boundary counts, pixels; 0 where boundaries do not count.
+    pub fn tolerance_px(&self) -> f64 {
+        if self.boundary_f1 > 0.0 { self.boundary_tolerance_px } else { 0.0 }
     }
 }
 
@@ -68,8 +78,12 @@ impl Settings {
 pub(crate) mod tests {
     use super::*;
 
-    /// The defaults that stand in the schema.
+    /// The defaults of the schema, with what they stand for put in.
     pub(crate) fn defaults() -> Settings {
+        as_in_the_schema().resolved()
+    }
+
+    fn as_in_the_schema() -> Settings {
         let schema: serde_json::Value = serde_json::from_str(include_str!("settings.schema.json")).unwrap();
         let properties = schema["properties"].as_object().unwrap();
         let values: serde_json::Map<_, _> =
@@ -80,5 +94,14 @@ pub(crate) mod tests {
     #[test]
     fn the_schema_and_the_settings_have_the_same_keys() {
         assert!(defaults().refine);
+    }
+
+    #[test]
+    fn weights_that_are_given_win_over_the_profile() {
+        let paper = Settings { profile: Profile::Paper, ..as_in_the_schema() };
+        let weights = |settings: Settings| [settings.dice, settings.jaccard, settings.boundary_f1, settings.agreement];
+        assert_eq!(weights(paper.clone().resolved()).map(|weight| weight > 0.5), [true, true, true, false]);
+        let only = Settings { dice: 0.0, jaccard: 1.0, boundary_f1: 0.0, ..paper };
+        assert_eq!(weights(only.resolved()).map(|weight| weight > 0.5), [false, true, false, false]);
     }
 }
