@@ -175,6 +175,9 @@ pub struct Localize {
     /// Version, tag, date (@2026-03-01) or head
     #[arg(long, default_value = "head", value_name = "REV")]
     pub at: String,
+    /// Score every candidate on a view of the photo's full size, and say which is best by each metric: minutes for seconds
+    #[arg(long)]
+    pub exhaustive: bool,
     /// Write the score of every candidate position as a picture
     #[arg(long, value_name = "FILE.png")]
     pub heatmap: Option<PathBuf>,

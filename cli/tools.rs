@@ -101,6 +101,20 @@ impl Choices {
         Ok(choices)
     }
 
+    /// Makes `plugin`, a matcher of this run, score every candidate at full size.
+    pub fn exhaustive(&mut self, plugin: &Plugin) -> Result<(), Failure> {
+        const KEY: &str = "exhaustive";
+        let name = &plugin.info().name;
+        if !plugin.schema().iter().any(|(key, _)| key == KEY) {
+            return Err(Failure::usage(format!(
+                "--exhaustive: the matcher {name:?} has no such search; --matcher semantic has"
+            )));
+        }
+        let assignment = format!("{name}.{KEY}=true").parse().map_err(Failure::usage)?;
+        self.assignments.push(assignment);
+        Ok(())
+    }
+
     fn set_gate(&mut self, assignment: &Assignment) -> Result<(), Failure> {
         let value = number(assignment)?;
         let (largest, expected) = match assignment.key.as_str() {

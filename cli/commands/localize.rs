@@ -18,7 +18,10 @@ use std::path::Path;
 pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     let registry = registry(plugins)?;
     let plugin = load(&registry, &options.matcher)?;
-    let choices = Choices::read(&options.settings, &[&options.matcher])?;
+    let mut choices = Choices::read(&options.settings, &[&options.matcher])?;
+    if options.exhaustive {
+        choices.exhaustive(&plugin)?;
+    }
     let tool = choices.tool(&plugin)?;
     let mut matcher = tool.plugin.matcher(&tool.settings)?;
     let map = MapFile::open_read_only(&options.map)?;

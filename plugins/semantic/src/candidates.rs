@@ -4,7 +4,7 @@ use crate::likeness::{Compared, Likeness};
 use crate::mode::{Mode, angle_between, log_prior};
 use crate::settings::Settings;
 use resurvey_plugin::schema::{GridPoint, Pose};
-use resurvey_plugin::{CompareRequest, Error, Host, PanoramaRequest, Photo};
+use resurvey_plugin::{ClassCounts, CompareRequest, Error, Host, Level, PanoramaRequest, Photo};
 use std::collections::BTreeSet;
 
 /// Positions a call to the host: large enough to feed every core, small enough to stop soon after a cancel.
@@ -105,13 +105,14 @@ impl Sweep<'_, '_> {
             skipped: ((positions.len() - free.len()) * headings) as u64,
             heat: Vec::new(),
         };
+        let mut bests = BestBy::each(self.settings);
         let per_call = if self.settings.exhaustive { POSITIONS_PER_EXACT_CALL } else { POSITIONS_PER_CALL };
         for (call, positions) in free.chunks(per_call).enumerate() {
             if self.host.cancelled() {
                 return Err(Error("cancelled".to_owned()));
             }
             let scores = if self.settings.exhaustive {
-                self.on_views(&request, positions)?
+                self.on_views(&request, positions, &mut bests)?
             } else {
                 self.on_panoramas(&request, positions)?
             };
@@ -122,6 +123,7 @@ impl Sweep<'_, '_> {
             }
             self.host.progress(0.6 * ((call + 1) * per_call) as f64 / free.len().max(1) as f64);
         }
+        bests.iter().for_each(|best| best.log(self.host));
         Ok(coarse)
     }
 
@@ -132,12 +134,17 @@ impl Sweep<'_, '_> {
     }
 
     /// The same on views of the photo's full size.
-    fn on_views(&self, request: &PanoramaRequest, positions: &[GridPoint]) -> Result<Vec<f64>, Error> {
+    fn on_views(
+        &self,
+        request: &PanoramaRequest,
+        positions: &[GridPoint],
+        bests: &mut [BestBy],
+    ) -> Result<Vec<f64>, Error> {
         let full = CompareRequest {
             stride: 1,
             ignored_in_photo: request.ignored_in_photo,
             ignored_in_view: request.ignored_in_view,
-            boundary_tolerance_px: self.settings.tolerance_px(),
+            boundary_tolerance_px: self.settings.boundary_tolerance_px,
         };
         let headings = 0..request.yaw_count as usize;
         let poses: Vec<Pose> = positions
@@ -145,6 +152,11 @@ impl Sweep<'_, '_> {
             .flat_map(|position| headings.clone().map(|index| candidate(self.photo, request, *position, index)))
             .collect();
         let counts = self.host.compare_views(&full, &poses)?;
+        for best in bests {
+            for (pose, counts) in poses.iter().zip(&counts) {
+                best.take(*pose, counts);
+            }
+        }
         Ok(counts.iter().map(|counts| self.likeness.of_view(counts)).collect())
     }
 
@@ -163,6 +175,40 @@ impl Sweep<'_, '_> {
             columns: COLUMNS,
             ignored_in_photo: self.compared.ignored_in_photo,
             ignored_in_view: self.compared.ignored_in_view,
+        }
+    }
+}
+
+/// The best candidate by one metric alone.
+struct BestBy {
+    metric: &'static str,
+    likeness: Likeness,
+    best: Option<(f64, Pose)>,
+}
+
+impl BestBy {
+    /// One for each metric of Lee & Hsu (Eq. 5), with the class weights of `settings`.
+    fn each(settings: &Settings) -> [Self; 3] {
+        [("Dice", [1.0, 0.0, 0.0]), ("Jaccard", [0.0, 1.0, 0.0]), ("boundary F1", [0.0, 0.0, 1.0])].map(
+            |(metric, [dice, jaccard, boundary_f1])| {
+                let alone = Settings { dice, jaccard, boundary_f1, agreement: 0.0, ..settings.clone() };
+                Self { metric, likeness: Likeness::new(&alone), best: None }
+            },
+        )
+    }
+
+    fn take(&mut self, pose: Pose, counts: &[ClassCounts]) {
+        let score = self.likeness.of_view(counts);
+        if self.best.is_none_or(|(best, _)| score > best) {
+            self.best = Some((score, pose));
+        }
+    }
+
+    fn log(&self, host: &dyn Host) {
+        if let Some((score, Pose { position, yaw_rad, .. })) = self.best {
+            let (east, north, yaw) = (position.easting_m, position.northing_m, yaw_rad.to_degrees());
+            let line = format!("best by {}: {score:.4} at E {east:.2} N {north:.2}, heading {yaw:.1}°", self.metric);
+            host.log(Level::Info, &line);
         }
     }
 }
