@@ -4,7 +4,7 @@ use super::sweep::{ClassPlanes, PanoramaPhoto};
 use crate::camera::{Camera, camera_from_world};
 use crate::image::LabelImage;
 use crate::metrics::{ComparedPhoto, ViewPlanes};
-use crate::render::panorama::PanoramaGrid;
+use crate::render::panorama::{Panorama, PanoramaGrid};
 use crate::render::{Renderer, Scene, view};
 use rayon::prelude::*;
 use resurvey_schema::service::{ClassCounts, CompareRequest, PanoramaRequest};
@@ -18,6 +18,8 @@ const WORDS: usize = 2;
 
 /// Poses that a thread compares one after the other: neighbours show much the same.
 const TOGETHER: usize = 9;
+/// Positions that a thread compares one after the other, likewise.
+const POSITIONS_TOGETHER: usize = 32;
 
 /// The photo at one stride, ready to be compared with views.
 pub struct ViewPhoto {
@@ -103,7 +105,17 @@ pub struct PositionPhoto {
     photo: PanoramaPhoto,
     request: PanoramaRequest,
     classes: usize,
+    /// Column of the first heading.
+    first: i64,
+    /// Columns that take part, as flags and as indices.
+    wanted: Vec<bool>,
+    columns: Vec<usize>,
+    /// What no thread uses now: panoramas know what showed last.
+    spare: Mutex<Vec<(Panorama, ClassPlanes)>>,
 }
+
+/// A position and where its counts go.
+type Position<'a> = (GridPoint, &'a mut [ClassCounts]);
 
 impl PositionPhoto {
     /// The photo as `request` wants it compared.
@@ -122,27 +134,42 @@ impl PositionPhoto {
             inside.then(|| photo.at(u as u32, v as u32))
         };
         let photo = PanoramaPhoto::new(&grid, classes, &request.ignored_in_photo, class_at);
-        Self { grid, photo, request: *request, classes }
+        let column_rad = std::f64::consts::TAU / f64::from(request.columns);
+        let first = (request.first_yaw_rad / column_rad).round() as i64;
+        let wanted = photo.wanted(first, request.yaw_step_columns, request.yaw_count);
+        let columns = (0..wanted.len()).filter(|&column| wanted[column]).collect();
+        Self { grid, photo, request: *request, classes, first, wanted, columns, spare: Mutex::default() }
     }
 
-    /// Fills `counts[position][heading][class]`.
+    /// Fills `counts[position][heading][class]`; fastest when positions come in rows of the same northing.
     pub fn compare(&self, scene: &Scene, positions: &[GridPoint], counts: &mut [ClassCounts]) {
-        let headings = self.request.yaw_count as usize;
-        let column_rad = std::f64::consts::TAU / f64::from(self.request.columns);
-        let first = (self.request.first_yaw_rad / column_rad).round() as i64;
-        let wanted = self.photo.wanted(first, self.request.yaw_step_columns, self.request.yaw_count);
-        let blank = || (self.grid.frame(), ClassPlanes::new(&self.grid, self.classes), vec![0; self.grid.rows()]);
-        let per_position = positions.par_iter().zip(counts.par_chunks_mut((headings * self.classes).max(1)));
-        per_position.for_each_init(blank, |(frame, planes, classes), (position, counts)| {
-            self.grid.draw_scene(frame, scene, scene.offset(*position), &wanted);
-            for column in (0..self.grid.columns()).filter(|&column| wanted[column]) {
-                self.grid.classes(frame, scene, column, classes);
-                planes.fill_column(column, classes, &self.request.ignored_in_view);
+        let per_position = (self.request.yaw_count as usize * self.classes).max(1);
+        let mut work: Vec<Position> = positions.iter().copied().zip(counts.chunks_mut(per_position)).collect();
+        // Every other row backwards, so that each position is next to the one before.
+        let rows = work.chunk_by_mut(|a, b| a.0.northing_m.to_bits() == b.0.northing_m.to_bits());
+        rows.skip(1).step_by(2).for_each(<[Position]>::reverse);
+        work.par_chunks_mut(POSITIONS_TOGETHER).for_each(|positions| {
+            let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let (mut panorama, mut planes) = spare.unwrap_or_else(|| {
+                (Panorama::new(&self.grid, &self.wanted), ClassPlanes::new(&self.grid, self.classes))
+            });
+            for (position, counts) in positions {
+                self.compare_one((&mut panorama, &mut planes), scene, *position, counts);
             }
-            for (heading, counts) in counts.chunks_mut(self.classes).enumerate() {
-                let column = first + heading as i64 * i64::from(self.request.yaw_step_columns);
-                self.photo.counts(planes, column, counts);
-            }
+            self.spare.lock().unwrap_or_else(PoisonError::into_inner).push((panorama, planes));
         });
+    }
+
+    fn compare_one(
+        &self,
+        (panorama, planes): (&mut Panorama, &mut ClassPlanes),
+        scene: &Scene,
+        position: GridPoint,
+        counts: &mut [ClassCounts],
+    ) {
+        panorama.draw(scene, scene.offset(position));
+        let classes = |column: usize, classes: &mut [u8]| panorama.classes(scene, column, classes);
+        planes.fill(&self.columns, &self.request.ignored_in_view, classes);
+        self.photo.counts(planes, self.first, self.request.yaw_step_columns, counts);
     }
 }

@@ -1,6 +1,8 @@
 //! Comparing one panorama with the photo at every heading: bit planes per class, a heading is an offset.
 
+use crate::image::mask;
 use crate::render::panorama::{PanoramaGrid, ROWS_PER_WORD};
+use pulp::{Arch, Simd, WithSimd};
 use resurvey_schema::ClassId;
 use resurvey_schema::service::{ClassCounts, ClassSet};
 use std::ops::Range;
@@ -8,10 +10,17 @@ use std::ops::Range;
 /// One bit plane per class over a panorama, stored twice over so that any heading is one contiguous slice.
 #[derive(Clone, Debug)]
 pub struct ClassPlanes {
+    arch: Arch,
     words: usize,
     planes: Vec<Vec<u64>>,
     /// Cells whose class takes part in the comparison.
     compared: Vec<u64>,
+    /// Classes that occur.
+    present: Vec<bool>,
+    /// Whether every cell takes part.
+    whole: bool,
+    /// Classes of a column.
+    column: Vec<u8>,
 }
 
 impl ClassPlanes {
@@ -19,27 +28,63 @@ impl ClassPlanes {
     pub fn new(grid: &PanoramaGrid, classes: usize) -> Self {
         let words = grid.words();
         let length = 2 * grid.columns() * words;
-        Self { words, planes: vec![vec![0; length]; classes], compared: vec![0; length] }
+        Self {
+            arch: Arch::new(),
+            words,
+            planes: vec![vec![0; length]; classes],
+            compared: vec![0; length],
+            present: vec![false; classes],
+            whole: false,
+            column: vec![0; grid.rows()],
+        }
     }
 
-    /// Sets the cells of one column to `classes`, lowest row first; void, `ignored` and unknown classes take no part.
-    pub fn fill_column(&mut self, column: usize, classes: &[u8], ignored: &ClassSet) {
-        let half = self.compared.len() / 2;
-        for (word, classes) in classes.chunks(ROWS_PER_WORD).enumerate() {
-            let index = column * self.words + word;
-            self.planes.iter_mut().for_each(|plane| plane[index] = 0);
-            self.compared[index] = 0;
-            let mut bit = 0;
-            for run in classes.chunk_by(|a, b| a == b) {
-                let bits = (u64::MAX >> (ROWS_PER_WORD - run.len())) << bit;
-                bit += run.len();
-                if usize::from(run[0]) < self.planes.len() && !ignored.contains(ClassId(run[0])) {
-                    self.planes[usize::from(run[0])][index] |= bits;
-                    self.compared[index] |= bits;
+    /// Sets the cells of `columns` to what `classes` writes for each, lowest row first, and forgets which classes occur
+    /// in others; void, `ignored` and unknown classes take no part.
+    pub fn fill(&mut self, columns: &[usize], ignored: &ClassSet, mut classes: impl FnMut(usize, &mut [u8])) {
+        self.present.fill(false);
+        self.whole = true;
+        for &column in columns {
+            classes(column, &mut self.column);
+            self.arch.dispatch(SetColumn { planes: self, column, ignored });
+        }
+    }
+}
+
+/// Sets the planes of one column.
+struct SetColumn<'a> {
+    planes: &'a mut ClassPlanes,
+    column: usize,
+    ignored: &'a ClassSet,
+}
+
+impl WithSimd for SetColumn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { planes: ClassPlanes { words, planes, compared, present, whole, column: classes, .. }, .. } = self;
+        let half = compared.len() / 2;
+        for (word, classes) in classes.as_chunks::<ROWS_PER_WORD>().0.iter().enumerate() {
+            let index = self.column * *words + word;
+            for plane in planes.iter_mut() {
+                (plane[index], plane[half + index]) = (0, 0);
+            }
+            let (mut left, mut taken) = (u64::MAX, 0);
+            while left != 0 {
+                let class = classes[left.trailing_zeros() as usize];
+                let cells = mask(simd, classes, class);
+                left &= !cells;
+                if let Some(plane) = planes.get_mut(usize::from(class))
+                    && !self.ignored.contains(ClassId(class))
+                {
+                    (plane[index], plane[half + index]) = (cells, cells);
+                    present[usize::from(class)] = true;
+                    taken |= cells;
                 }
             }
-            self.compared[half + index] = self.compared[index];
-            self.planes.iter_mut().for_each(|plane| plane[half + index] = plane[index]);
+            (compared[index], compared[half + index]) = (taken, taken);
+            *whole &= taken == u64::MAX;
         }
     }
 }
@@ -51,8 +96,8 @@ pub struct PanoramaPhoto {
     columns: usize,
     /// Columns that the photo sees, relative to its heading; may start below zero.
     seen: Range<isize>,
-    /// Classes that occur in the photo.
-    present: Vec<bool>,
+    /// Cells of each class.
+    cells: Vec<u32>,
 }
 
 impl PanoramaPhoto {
@@ -65,11 +110,12 @@ impl PanoramaPhoto {
         class_at: impl Fn(usize, usize) -> Option<u8>,
     ) -> Self {
         let mut planes = ClassPlanes::new(grid, classes);
-        for column in 0..grid.columns() {
-            let classes: Vec<u8> =
-                (0..grid.rows()).map(|row| class_at(column, row).unwrap_or(ClassId::VOID.0)).collect();
-            planes.fill_column(column, &classes, ignored);
-        }
+        let all: Vec<usize> = (0..grid.columns()).collect();
+        planes.fill(&all, ignored, |column, classes| {
+            for (row, class) in classes.iter_mut().enumerate() {
+                *class = class_at(column, row).unwrap_or(ClassId::VOID.0);
+            }
+        });
         let columns = grid.columns();
         let words = planes.words;
         let seen_at = |column: isize| {
@@ -79,8 +125,10 @@ impl PanoramaPhoto {
         let half = columns as isize / 2;
         let first = (-half..columns as isize - half).find(|&column| seen_at(column)).unwrap_or(0);
         let end = (-half..columns as isize - half).rev().find(|&column| seen_at(column)).map_or(first, |last| last + 1);
-        let present = planes.planes.iter().map(|plane| plane.iter().any(|&word| word != 0)).collect();
-        Self { planes, columns, seen: first..end, present }
+        let once = columns * words;
+        let cells =
+            planes.planes.iter().map(|plane| plane[..once].iter().map(|word| word.count_ones()).sum()).collect();
+        Self { planes, columns, seen: first..end, cells }
     }
 
     /// The columns of a view that take part at the headings from column `first` on, every `step`, `count` in all.
@@ -95,28 +143,69 @@ impl PanoramaPhoto {
         wanted
     }
 
-    /// Counts per class against `view` at the heading of column `heading`; boundary counts stay zero.
-    pub fn counts(&self, view: &ClassPlanes, heading: i64, counts: &mut [ClassCounts]) {
-        let words = self.planes.words;
-        let wrapped = |column: i64| column.rem_euclid(self.columns as i64) as usize * words;
-        let length = self.seen.len() * words;
-        let (photo_from, view_from) = (wrapped(self.seen.start as i64), wrapped(self.seen.start as i64 + heading));
-        let photo_compared = &self.planes.compared[photo_from..photo_from + length];
-        let view_compared = &view.compared[view_from..view_from + length];
-        for (class, count) in counts.iter_mut().enumerate() {
-            let seen = &view.planes[class][view_from..view_from + length];
-            count.view = common(seen, photo_compared);
-            if self.present[class] {
-                let labelled = &self.planes.planes[class][photo_from..photo_from + length];
-                count.photo = common(labelled, view_compared);
-                count.both = common(labelled, seen);
+    /// Counts class by class against `view` at the headings from column `first` on, every `step`, as many as `counts`
+    /// holds; boundary counts are zero.
+    pub fn counts(&self, view: &ClassPlanes, first: i64, step: u32, counts: &mut [ClassCounts]) {
+        view.arch.dispatch(Count { photo: self, view, first, step, counts });
+    }
+}
+
+/// Counts at every heading.
+struct Count<'a> {
+    photo: &'a PanoramaPhoto,
+    view: &'a ClassPlanes,
+    first: i64,
+    step: u32,
+    counts: &'a mut [ClassCounts],
+}
+
+impl WithSimd for Count<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { photo: PanoramaPhoto { planes: photo, columns, seen, cells }, view, first, step, counts } = self;
+        let wrapped = |column: i64| column.rem_euclid(*columns as i64) as usize * photo.words;
+        let length = seen.len() * photo.words;
+        let photo_from = wrapped(seen.start as i64);
+        let photo_compared = &photo.compared[photo_from..photo_from + length];
+        for (heading, counts) in counts.chunks_mut(cells.len().max(1)).enumerate() {
+            let view_from = wrapped(seen.start as i64 + first + heading as i64 * i64::from(step));
+            for (class, count) in counts.iter_mut().enumerate() {
+                *count = ClassCounts::default();
+                let labelled = &photo.planes[class][photo_from..photo_from + length];
+                let seen = &view.planes[class][view_from..view_from + length];
+                if view.present[class] && cells[class] > 0 {
+                    [count.view, count.both] = common_with_each(seen, [photo_compared, labelled]);
+                } else if view.present[class] {
+                    count.view = common(seen, photo_compared);
+                }
+                count.photo = match cells[class] {
+                    all if view.whole || all == 0 => all,
+                    _ => common(labelled, &view.compared[view_from..view_from + length]),
+                };
             }
         }
     }
 }
 
+#[inline(always)]
 fn common(a: &[u64], b: &[u64]) -> u32 {
-    a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
+    let mut count = 0;
+    for (a, b) in a.iter().zip(b) {
+        count += u64::from((a & b).count_ones());
+    }
+    count as u32
+}
+
+#[inline(always)]
+fn common_with_each(a: &[u64], [b, c]: [&[u64]; 2]) -> [u32; 2] {
+    let (mut with_b, mut with_c) = (0, 0);
+    for ((a, b), c) in a.iter().zip(b).zip(c) {
+        with_b += u64::from((a & b).count_ones());
+        with_c += u64::from((a & c).count_ones());
+    }
+    [with_b as u32, with_c as u32]
 }
 
 #[cfg(test)]
@@ -134,13 +223,12 @@ mod tests {
         };
         let photo = PanoramaPhoto::new(&grid, 2, &ClassSet::default(), seen);
         let mut view = ClassPlanes::new(&grid, 2);
-        for column in 0..8 {
-            let class = u8::from(matches!(column, 4 | 5));
-            view.fill_column(column, &[class; 64], &ClassSet::default());
-        }
+        view.fill(&[0, 1, 2, 3, 4, 5, 6, 7], &ClassSet::default(), |column, classes| {
+            classes.fill(u8::from(matches!(column, 4 | 5)));
+        });
         let both = |heading: i64| {
             let mut counts = vec![ClassCounts::default(); 2];
-            photo.counts(&view, heading, &mut counts);
+            photo.counts(&view, heading, 1, &mut counts);
             (counts[0].both, counts[1].both, counts[1].photo, counts[1].view)
         };
         assert_eq!(both(4), (32, 64, 64, 64), "heading of column 4: all agrees");
@@ -156,12 +244,11 @@ mod tests {
         let mut ignored = ClassSet::default();
         ignored.insert(ClassId(0));
         let mut view = ClassPlanes::new(&grid, 2);
-        for column in 0..4 {
-            let classes: Vec<u8> = (0..64).map(|row| u8::from(row >= 32)).collect();
-            view.fill_column(column, &classes, &ignored);
-        }
+        view.fill(&[0, 1, 2, 3], &ignored, |_, classes| {
+            classes.iter_mut().enumerate().for_each(|(row, class)| *class = u8::from(row >= 32));
+        });
         let mut counts = vec![ClassCounts::default(); 2];
-        photo.counts(&view, 0, &mut counts);
+        photo.counts(&view, 0, 1, &mut counts);
         assert_eq!((counts[1].photo, counts[1].view, counts[1].both, counts[0].view), (4 * 32, 4 * 32, 4 * 32, 0));
     }
 }
