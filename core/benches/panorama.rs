@@ -50,7 +50,12 @@ fn search(world: &World, capture: &Capture, pools: &[ThreadPool; 2], radius_m: i
         let inside = services().inside_solid(&disc).expect("finite positions");
         free = disc.iter().zip(inside).filter(|(_, inside)| !inside).map(|(position, _)| *position).collect();
     });
-    println!("  radius {radius_m} m: {} positions, {} not inside buildings; found {}", disc.len(), free.len(), ms(solid));
+    println!(
+        "  radius {radius_m} m: {} positions, {} not inside buildings; found {}",
+        disc.len(),
+        free.len(),
+        ms(solid)
+    );
     let request = request(capture);
     let mut counts = vec![ClassCounts::default(); POSITIONS_PER_CALL * HEADINGS as usize * CLASSES];
     for pool in pools {
@@ -132,8 +137,7 @@ fn capture(scene: &Scene) -> Capture {
     for (u, v) in (330..520).flat_map(|v| (600..690).map(move |u| (u, v))) {
         labels.set(u, v, 7);
     }
-    let prior =
-        Prior { pose, position_sigma_m: 10.0, height_sigma_m: 0.1, yaw_sigma_rad: 0.3, tilt_sigma_rad: 0.02 };
+    let prior = Prior { pose, position_sigma_m: 10.0, height_sigma_m: 0.1, yaw_sigma_rad: 0.3, tilt_sigma_rad: 0.02 };
     let digest = Digest::of(b"bench");
     Capture { labels, label_bytes: Vec::new(), camera: city::camera(), prior, taken_at: None, digest }
 }

@@ -8,7 +8,7 @@ pub(super) const TILE: usize = 8;
 const ABREAST: usize = LANES / TILE;
 
 /// Inverse depths drawn are off by a few roundings to f32; a share far above that keeps answers certain.
-const CERTAIN: f32 = 1e-5;
+pub(super) const CERTAIN: f32 = 1e-5;
 
 /// The smallest inverse depth in each tile of a band, at the time it was taken.
 #[derive(Clone, Debug, Default)]

@@ -5,9 +5,9 @@ use super::cone::Cone;
 use super::grid::{PanoramaGrid, Sector};
 use super::reach::{Frame, Reach};
 use crate::render::Scene;
-use crate::render::band::{Band, LANES};
+use crate::render::band::{Band, Block, LANES};
 use crate::render::code::Code;
-use crate::render::occlusion::Occlusion;
+use crate::render::occlusion::{CERTAIN, Occlusion};
 use crate::render::shown::Shown;
 use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
@@ -165,7 +165,7 @@ impl WithSimd for Draw<'_> {
         let (mut painted, mut next_look) = (0, FIRST_LOOK);
         let mut walk = scene.hierarchy().start(eye.map(|value| value as f32), stack);
         while let Some(place) = walk.next() {
-            if !frame.of_box(place.bounds(), *eye).is_some_and(|reach| may_show(occlusion, &reach)) {
+            if !frame.of_box(place.bounds(), *eye).is_some_and(|reach| may_show(occlusion, band, &reach)) {
                 continue;
             }
             let Some(cluster) = place.cluster() else {
@@ -178,7 +178,7 @@ impl WithSimd for Draw<'_> {
                 }
                 let corners = corners(scene, triangle as u32, *eye);
                 if let Some(reach) = frame.of_triangle(&corners)
-                    && may_show(occlusion, &reach)
+                    && may_show(occlusion, band, &reach)
                     && let Some(cone) = Cone::new(&corners)
                 {
                     cone.paint(simd, band, (grid, sector), &reach, scene.codes()[triangle]);
@@ -193,12 +193,33 @@ impl WithSimd for Draw<'_> {
     }
 }
 
-/// Whether not all that something can touch is hidden. What is drawn is never nearer than its reach says, so what is
-/// hidden could not even be equal.
+/// Whether not all that something can touch is hidden, by tiles as they were and then by cells as they are. What is drawn
+/// is never nearer than its reach says, so what is hidden could not even be equal.
 #[inline(always)]
-fn may_show(occlusion: &Occlusion, reach: &Reach) -> bool {
-    let shows = |[first, end]: [i32; 2]| first < end && !occlusion.hides(reach.rows, [first, end], reach.nearest);
+fn may_show(occlusion: &Occlusion, band: &Band, reach: &Reach) -> bool {
+    let shows = |[first, end]: [i32; 2]| {
+        first < end
+            && !occlusion.hides(reach.rows, [first, end], reach.nearest)
+            && (first..end).any(|column| shows_in_column(band.row(column as usize), reach))
+    };
     reach.columns.into_iter().any(shows)
+}
+
+/// Whether something can be as near as one of the cells of a column that it can touch.
+#[inline(always)]
+fn shows_in_column(blocks: &[Block], reach: &Reach) -> bool {
+    let nearest = reach.nearest * (1.0 + CERTAIN);
+    let [first, end] = reach.rows.map(|row| row as usize);
+    let length = (end - first) as u32;
+    let touched = first / LANES..end.div_ceil(LANES);
+    touched.clone().zip(&blocks[touched]).any(|(index, block)| {
+        let mut shows = false;
+        for lane in 0..LANES {
+            let inside = ((index * LANES + lane) as u32).wrapping_sub(first as u32) < length;
+            shows |= inside & (block.inverse_depths[lane] <= nearest);
+        }
+        shows
+    })
 }
 
 /// Draws one triangle.
