@@ -236,6 +236,9 @@ pub struct Update {
     /// Do everything but write: the map stays as it is
     #[arg(long)]
     pub dry_run: bool,
+    /// Also write an HTML page per capture and an index.html that links them, whatever the run comes to
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// Keep the label image in the map as evidence
     #[arg(long)]
     pub keep_labels: bool,

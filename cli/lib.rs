@@ -8,6 +8,7 @@ mod document;
 mod failure;
 mod prior;
 mod region;
+mod report;
 mod tools;
 
 use args::{Cli, Command};

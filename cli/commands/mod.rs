@@ -29,7 +29,7 @@ fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
 }
 
 /// Writes a file that the user named, over one that is there unless that is a map.
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if MapFile::open_read_only(path).is_ok() {
         let text = format!("{}: expected a file to write, found a map, which nothing writes over", path.display());
         return Err(Failure::input(text));

@@ -7,6 +7,7 @@ use crate::console::{Console, Stage};
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
 use crate::prior::{Placed, read_placed};
+use crate::report::{Reports, Seen, Sheet};
 use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, read_pose};
@@ -30,6 +31,7 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
     let mut tools = Tools::load(options, plugins)?;
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
     let given = options.pose.as_deref().map(read_pose).transpose()?;
+    let mut reports = options.report.as_deref().map(Reports::start).transpose()?;
     let mut documents = Vec::new();
     let mut code = Ok(NOTHING);
     for path in &options.captures {
@@ -40,12 +42,15 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
             author: &options.author,
         };
         let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new() };
-        match run.capture(path, (given, &options.prior), &mut tools, console) {
+        match run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console) {
             Ok((document, of_capture)) => {
                 code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
                 documents.push(document);
             }
             Err(failure) => {
+                if let Some(reports) = &mut reports {
+                    reports.add_failure(path, &failure)?;
+                }
                 code = Err(failure);
                 break;
             }
@@ -145,6 +150,8 @@ pub(super) struct Outcome {
     pub(super) located: Located,
     pub(super) resolution: Resolution,
     viewed_region: Option<BoxMm>,
+    /// `None` where the pose is not reliable.
+    seen: Option<Seen>,
 }
 
 impl Run<'_> {
@@ -153,12 +160,27 @@ impl Run<'_> {
         path: &Path,
         (given, prior): (Option<Pose>, &PriorFrom),
         tools: &mut Tools,
+        reports: Option<&mut Reports>,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
         let work = self.read(path, given, prior, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
-        self.report(path, &work, &outcome, &committed, (tools.matcher.info(), &tools.comparers.used), console)
+        let used = (tools.matcher.info(), tools.comparers.used.as_slice());
+        let (document, code) = self.report(path, &work, &outcome, &committed, used, console)?;
+        if let Some(reports) = reports {
+            reports.add(&Sheet {
+                path,
+                map: self.map.path(),
+                document: &document,
+                capture: &work.capture,
+                world: &work.world,
+                located: &outcome.located,
+                resolution: &outcome.resolution,
+                seen: outcome.seen.as_ref(),
+            })?;
+        }
+        Ok((document, code))
     }
 
     /// Reads the capture at `path` and the map around it.
@@ -186,12 +208,13 @@ impl Run<'_> {
         comparers: &mut Comparers,
         console: &mut Console<'_>,
     ) -> Result<(Outcome, Committed), Failure> {
-        let (resolution, viewed_region) = if located.is_reliable() {
-            self.compare(&work.world, &work.capture, &located, comparers, console)?
+        let (resolution, viewed_region, seen) = if located.is_reliable() {
+            let (resolution, region, seen) = self.compare(&work.world, &work.capture, &located, comparers, console)?;
+            (resolution, region, Some(seen))
         } else {
-            (Resolution::default(), None)
+            (Resolution::default(), None, None)
         };
-        let outcome = Outcome { located, resolution, viewed_region };
+        let outcome = Outcome { located, resolution, viewed_region, seen };
         let stage = console.stage("commit");
         let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
@@ -223,7 +246,7 @@ impl Run<'_> {
         located: &Located,
         comparers: &mut Comparers,
         console: &mut Console<'_>,
-    ) -> Result<(Resolution, Option<BoxMm>), Failure> {
+    ) -> Result<(Resolution, Option<BoxMm>, Seen), Failure> {
         let mut time = |name: &'static str, console: &mut Console<'_>, stage: &Stage| {
             self.timings.insert(name.to_owned(), json!(console.finish(stage)));
         };
@@ -241,8 +264,9 @@ impl Run<'_> {
         let services = SceneServices::new(world, capture, self.crs, &stage);
         let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions)?;
         time("estimate", console, &stage);
-        let resolution = resolve(proposals, &regions, world.descriptors());
-        Ok((resolution, comparison.viewed_region()))
+        let resolution = resolve(proposals.clone(), &regions, world.descriptors());
+        let viewed_region = comparison.viewed_region();
+        Ok((resolution, viewed_region, Seen { view, regions, proposals }))
     }
 
     /// Commits the changes, or records the attempt; a dry run does neither.
