@@ -352,7 +352,11 @@ pub struct Export {
 
 /// Arguments of `eval`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, disable_help_subcommand = true)]
 pub struct Eval {
+    /// An experiment that needs no captures
+    #[command(subcommand)]
+    pub experiment: Option<Experiment>,
     /// Captures with truth.json: directories of one each, or directories that hold such directories
     #[arg(required = true)]
     pub cases: Vec<PathBuf>,
@@ -389,6 +393,31 @@ pub struct Eval {
     /// Write a line for each capture and matcher
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+}
+
+/// Experiments of `eval` that need no captures.
+#[derive(Debug, Subcommand)]
+pub enum Experiment {
+    /// What an error of the pose, 0 to 5 m, does to a pedestrian on level ground and to a banner on a wall, beside what
+    /// geometry says (the paper's Table V); writes only what you name with --out
+    #[command(name = "table-v")]
+    TableV(TableV),
+}
+
+/// Arguments of `eval table-v`.
+#[derive(Debug, Args)]
+pub struct TableV {
+    /// Change detector
+    #[arg(long, default_value = "class-difference")]
+    pub detector: String,
+    /// Descriptor estimator
+    #[arg(long, default_value = "descriptors")]
+    pub estimator: String,
+    #[command(flatten)]
+    pub settings: Settings,
+    /// Draw both curves into this directory: table-v-pedestrian.svg, table-v-banner.svg
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `plugins` subcommands.

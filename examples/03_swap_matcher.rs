@@ -9,11 +9,18 @@ mod synthetic;
 
 use session::{Session, pose_error};
 use std::collections::BTreeMap;
-use synthetic::{Case, NoiseLevel, Scene, SceneKind, Suite};
+use synthetic::{Case, Changes, NoiseLevel, Scene, SceneKind, Suite};
 
 fn main() -> anyhow::Result<()> {
     let session = Session::start("swap_matcher")?;
-    let suite = Suite { scene: SceneKind::Street, seed: 11, count: 5, noise: NoiseLevel::LIGHT, change: None };
+    let suite = Suite {
+        scene: SceneKind::Street,
+        seed: 11,
+        capture_seed: 11,
+        count: 5,
+        noise: NoiseLevel::LIGHT,
+        changes: Changes::InTurn,
+    };
     let scene = Scene::new(suite.scene, suite.seed);
     session.import(&scene)?;
 

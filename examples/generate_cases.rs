@@ -1,17 +1,30 @@
 //! Writes captures with known truth of an invented place, and its map.
 //!
 //! `cargo run --release --example generate_cases -- --scene street --count 20 --noise light --seed 1 --out out/cases`
+//!
+//! With `--suite` of every place at light and field noise, every other capture without a change, all into one directory
+//! that `resurvey eval OUT --updates` reads:
+//!
+//! `cargo run --release --example generate_cases -- --suite --seed 1 --out out/suite`
 
 #[path = "synthetic/mod.rs"]
 mod synthetic;
 
 use clap::Parser;
 use std::path::PathBuf;
-use synthetic::{ChangeKind, NoiseLevel, SceneKind, Suite, write_suite};
+use synthetic::{ChangeKind, Changes, NoiseLevel, SceneKind, Suite, full_suite, write_suite};
+
+/// Captures of each place and noise of `--suite`: 208 in all.
+const SUITE_COUNT: usize = 26;
+/// Captures of one place.
+const COUNT: usize = 10;
 
 /// Writes maps/SCENE and one directory a capture under OUT.
 #[derive(Parser)]
 struct Arguments {
+    /// Every place at light and field noise, every other capture without a change.
+    #[arg(long, conflicts_with_all = ["scene", "noise", "change"])]
+    suite: bool,
     /// street, alley, blocks or hall.
     #[arg(long, default_value = "street")]
     scene: SceneKind,
@@ -22,9 +35,9 @@ struct Arguments {
     /// left out.
     #[arg(long)]
     change: Option<ChangeKind>,
-    /// Number of captures.
-    #[arg(long, default_value_t = 10)]
-    count: usize,
+    /// Number of captures, 10 when left out; with --suite of each place and noise, 26 when left out (208 in all).
+    #[arg(long)]
+    count: Option<usize>,
     /// The place and the captures follow from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -34,9 +47,17 @@ struct Arguments {
 }
 
 fn main() -> anyhow::Result<()> {
-    let Arguments { scene, noise, change, count, seed, out } = Arguments::parse();
-    for folder in write_suite(&Suite { scene, seed, count, noise, change }, &out)? {
-        println!("{}", folder.display());
+    let Arguments { suite, scene, noise, change, count, seed, out } = Arguments::parse();
+    let changes = change.map_or(Changes::InTurn, Changes::Only);
+    let suites = if suite {
+        full_suite(seed, count.unwrap_or(SUITE_COUNT))
+    } else {
+        vec![Suite { scene, seed, capture_seed: seed, count: count.unwrap_or(COUNT), noise, changes }]
+    };
+    for suite in suites {
+        for folder in write_suite(&suite, &out)? {
+            println!("{}", folder.display());
+        }
     }
     Ok(())
 }

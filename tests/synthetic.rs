@@ -5,9 +5,10 @@
 mod synthetic;
 
 use serde_json::Value;
+use std::collections::BTreeSet;
 use synthetic::model::Model;
 use synthetic::world::class;
-use synthetic::{Case, CaseSpec, ChangeKind, NoiseLevel, Scene, SceneKind, three_ds};
+use synthetic::{Case, CaseSpec, ChangeKind, NoiseLevel, Scene, SceneKind, full_suite, three_ds};
 
 fn case(kind: SceneKind, change: ChangeKind, noise: NoiseLevel, seed: u64) -> Case {
     let name = format!("{}-{}", kind.name(), change.name());
@@ -156,4 +157,22 @@ fn the_3ds_chunks_fill_the_file_exactly() {
         at += chunk(at).1;
     }
     assert_eq!((at, end, objects), (bytes.len(), bytes.len(), model.parts.len()));
+}
+
+#[test]
+fn half_of_the_full_suite_is_without_a_change_and_no_two_captures_are_one() {
+    let suites = full_suite(1, 26);
+    let specs: Vec<CaseSpec> =
+        suites.iter().flat_map(|suite| suite.specs(&Scene::new(suite.scene, suite.seed))).collect();
+    assert!(specs.len() >= 200, "{} captures", specs.len());
+    let unchanged = specs.iter().filter(|spec| spec.change == ChangeKind::None).count();
+    assert_eq!(2 * unchanged, specs.len());
+    let names: BTreeSet<&str> = specs.iter().map(|spec| spec.name.as_str()).collect();
+    assert_eq!(names.len(), specs.len(), "each has a directory of its own");
+    let places = |spec: &CaseSpec| (spec.name.split('-').next().map(str::to_owned), spec.seed);
+    let drawn: BTreeSet<_> = specs.iter().map(places).collect();
+    assert_eq!(drawn.len(), specs.len(), "light and field do not show the same poses");
+    for noise in ["light", "field"] {
+        assert_eq!(specs.iter().filter(|spec| spec.noise.name == noise).count(), specs.len() / 2);
+    }
 }

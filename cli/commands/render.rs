@@ -72,7 +72,7 @@ fn grey(range_m: f64) -> u16 {
 }
 
 /// The camera of Lee & Hsu: 960×720 with a 120° diagonal.
-fn paper_camera() -> Result<Camera, Failure> {
+pub(super) fn paper_camera() -> Result<Camera, Failure> {
     let file = CameraFile {
         model: "pinhole".to_owned(),
         width: 960,

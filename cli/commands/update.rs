@@ -400,7 +400,7 @@ fn given_pose(world: &World, pose: Pose, limits: &GateLimits) -> Located {
 }
 
 /// A pose that was given is taken at its word.
-fn exactly(pose: Pose) -> Localization {
+pub(super) fn exactly(pose: Pose) -> Localization {
     Localization {
         pose,
         score: 1.0,

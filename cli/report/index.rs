@@ -3,7 +3,7 @@
 use super::base64::png_address;
 use super::numbers::text;
 use super::page::outcome;
-use super::section::{badge, document, table};
+use super::section::{badge, document, rows};
 use super::sheet::Sheet;
 use super::words::counted;
 use crate::failure::Failure;
@@ -61,7 +61,7 @@ impl Entry {
 
 /// The index of `entries`.
 pub fn index(entries: &[Entry]) -> String {
-    let rows: Vec<Vec<Markup>> = entries
+    let lines: Vec<Vec<Markup>> = entries
         .iter()
         .map(|entry| {
             vec![
@@ -77,7 +77,7 @@ pub fn index(entries: &[Entry]) -> String {
             h1 { "Update report" }
             p class="outcome" { (counted(entries.len(), "capture", "captures")) }
         }
-        @if !rows.is_empty() { section { (table(&["", "Capture", "Decision", "What came of it"], &rows)) } }
+        @if !lines.is_empty() { section { (rows(&["", "Capture", "Decision", "What came of it"], &lines)) } }
     };
     document("Update report – resurvey", &body).into_string()
 }

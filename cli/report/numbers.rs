@@ -68,8 +68,8 @@ pub fn gates(sheet: &Sheet<'_>) -> Markup {
     table(&["Gate", "Measured", "Limit", ""], &rows)
 }
 
-/// One change with every number of its descriptor, before and after.
-pub fn change(change: &Value, number_of: usize) -> Markup {
+/// One change with every number of its descriptor, before and after, beside `detail`.
+pub fn change(change: &Value, number_of: usize, detail: &Markup) -> Markup {
     let (op, class) = (text(&change["op"]), text(&change["class"]));
     let kind = match op {
         "add" => "added",
@@ -104,7 +104,7 @@ pub fn change(change: &Value, number_of: usize) -> Markup {
     html! {
         article class={ "change " (kind) } {
             h3 { span class={ "op " (kind) } { (kind) } " " (class) @if let Some(fid) = change["fid"].as_u64() { " " (fid) } @else if op == "add" { " (change " (number_of) ")" } }
-            (table(&heads, &rows(&descriptor)))
+            div class="beside" { (detail) (table(&heads, &rows(&descriptor))) }
         }
     }
 }

@@ -1,13 +1,16 @@
 //! What is drawn over an image of the photo: numbers of regions, and the points that were measured.
 
+use super::base64::png_address;
 use maud::{Markup, html};
 use nalgebra::Vector3;
 use resurvey_core::camera::{Camera, camera_from_world};
 use resurvey_core::update::Change;
-use resurvey_schema::{ChangeRegion, Descriptor, GridPoint, Pose};
+use resurvey_schema::{ChangeRegion, Descriptor, DynamicDescriptor, GridPoint, PixelBox, Pose};
 
 /// Points along one edge, so that edges bend with the lens.
 const EDGE_POINTS: u32 = 12;
+/// Least room around a change in its detail, pixels.
+const LEAST_AROUND_PX: f64 = 14.0;
 
 /// Where things of the map appear in the photo.
 pub struct Overlay<'a> {
@@ -20,7 +23,7 @@ pub struct Overlay<'a> {
 impl<'a> Overlay<'a> {
     /// Over the photo of `camera` at `pose`.
     pub fn new(camera: &'a Camera, pose: Pose) -> Self {
-        Self { camera, pose, letter_px: f64::from(camera.width()) / 34.0 }
+        Self { camera, pose, letter_px: f64::from(camera.width()) / 30.0 }
     }
 
     /// The numbers of `regions`, beside each.
@@ -40,27 +43,64 @@ impl<'a> Overlay<'a> {
 
     /// The descriptors of `changes`: corners numbered as they are stored, or the ground contact with the box on it.
     pub fn points(&self, changes: &[Change]) -> Markup {
-        self.svg(&html! {
-            @for change in changes {
-                @match change {
-                    Change::Add(after) => (self.descriptor(after, "added")),
-                    Change::Modify { before, after, .. } => {
-                        (self.descriptor(before, "before"))
-                        (self.descriptor(after, "modified"))
-                    },
-                    Change::Remove { before, .. } => (self.descriptor(before, "removed")),
-                }
+        self.svg(&html! { @for change in changes { (self.change(change)) } })
+    }
+
+    /// The part of the photo around `change`; `None` where nothing of it is in the photo.
+    pub fn part(&self, change: &Change) -> Option<PixelBox> {
+        let states = match change {
+            Change::Add(after) => vec![after],
+            Change::Modify { before, after, .. } => vec![before, after],
+            Change::Remove { before, .. } => vec![before],
+        };
+        let points = states.into_iter().flat_map(|state| match state {
+            Descriptor::Material(material) => material.corners.to_vec(),
+            Descriptor::Dynamic(object) => box_of(object).as_flattened().to_vec(),
+        });
+        let pixels: Vec<[f64; 2]> = points.filter_map(|point| self.pixel(point)).collect();
+        let side = |axis: usize, end: u32| {
+            let least = pixels.iter().map(|pixel| pixel[axis]).fold(f64::INFINITY, f64::min);
+            let most = pixels.iter().map(|pixel| pixel[axis]).fold(f64::NEG_INFINITY, f64::max);
+            let around = (0.35 * (most - least)).max(LEAST_AROUND_PX);
+            let end = f64::from(end);
+            ((least - around).clamp(0.0, end).floor() as u32, (most + around).clamp(0.0, end).ceil() as u32)
+        };
+        let ((left, right), (top, bottom)) = (side(0, self.camera.width()), side(1, self.camera.height()));
+        (!pixels.is_empty() && right > left && bottom > top).then_some(PixelBox { left, top, right, bottom })
+    }
+
+    /// `png`, which shows the photo inside `bounds`, with the points of `change` on it.
+    pub fn detail(&self, png: &[u8], bounds: PixelBox, change: &Change) -> Markup {
+        let (width, height) = (bounds.width(), bounds.height());
+        let letter_px = f64::from(width.max(height)) / 15.0;
+        let close = Overlay { letter_px, ..*self };
+        html! {
+            svg class="overlay detail" viewBox={ (bounds.left) " " (bounds.top) " " (width) " " (height) } role="img"
+                aria-label="The photo around the change" style=(close.style()) {
+                image href=(png_address(png)) x=(bounds.left) y=(bounds.top) width=(width) height=(height) {}
+                (close.change(change))
             }
-        })
+        }
     }
 
     fn svg(&self, contents: &Markup) -> Markup {
         let (width, height) = (self.camera.width(), self.camera.height());
         html! {
-            svg class="overlay" viewBox={ "0 0 " (width) " " (height) } aria-hidden="true"
-                style={ "font-size:" (tenth(self.letter_px)) "px;--thick:" (tenth(self.letter_px / 9.0)) "px" } {
-                (contents)
+            svg class="overlay" viewBox={ "0 0 " (width) " " (height) } aria-hidden="true" style=(self.style()) { (contents) }
+        }
+    }
+
+    fn style(&self) -> String {
+        format!("font-size:{}px;--thick:{:.2}px", tenth(self.letter_px), self.letter_px / 9.0)
+    }
+
+    fn change(&self, change: &Change) -> Markup {
+        match change {
+            Change::Add(after) => self.descriptor(after, "added"),
+            Change::Modify { before, after, .. } => {
+                html! { (self.descriptor(before, "before")) (self.descriptor(after, "modified")) }
             }
+            Change::Remove { before, .. } => self.descriptor(before, "removed"),
         }
     }
 
@@ -86,26 +126,14 @@ impl<'a> Overlay<'a> {
                 }
             }
             Descriptor::Dynamic(object) => {
-                let at = object.position;
-                let [along, across, up] = object.size_m;
-                let foot = |east: f64, north: f64, height: f64| {
-                    GridPoint::new(
-                        at.easting_m + east * across / 2.0,
-                        at.northing_m + north * along / 2.0,
-                        at.height_m + height,
-                    )
-                };
-                let ring = |height: f64| {
-                    [foot(-1.0, -1.0, height), foot(1.0, -1.0, height), foot(1.0, 1.0, height), foot(-1.0, 1.0, height)]
-                };
-                let (low, high) = (ring(0.0), ring(up));
+                let [low, high] = box_of(object);
                 html! {
                     path class={ "outline thin " (class) } d=(self.outline(&low)) {}
                     path class={ "outline thin " (class) } d=(self.outline(&high)) {}
                     @for (low, high) in low.into_iter().zip(high) {
                         path class={ "outline thin " (class) } d=(self.line(&[low, high])) {}
                     }
-                    @if let Some(at) = self.pixel(at) { (self.dot(at, class)) }
+                    @if let Some(at) = self.pixel(object.position) { (self.dot(at, class)) }
                 }
             }
         }
@@ -150,6 +178,18 @@ impl<'a> Overlay<'a> {
         let reach = 4.0 * f64::from(self.camera.width().max(self.camera.height()));
         (u.abs() < reach && v.abs() < reach).then_some([u, v])
     }
+}
+
+/// Corners of the box that an object fills, low and high, its heading left out.
+fn box_of(object: &DynamicDescriptor) -> [[GridPoint; 4]; 2] {
+    let at = object.position;
+    let [along, across, up] = object.size_m;
+    [0.0, up].map(|height| {
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(east, north)| {
+            let (east, north) = (east * across / 2.0, north * along / 2.0);
+            GridPoint::new(at.easting_m + east, at.northing_m + north, at.height_m + height)
+        })
+    })
 }
 
 fn between(from: GridPoint, to: GridPoint, share: f64) -> GridPoint {

@@ -3,9 +3,9 @@
 use super::fate::{Fate, fates};
 use super::numbers::{self, text};
 use super::overlay::Overlay;
-use super::pictures::{DROPPED, KEPT, Pictures, colour_of};
+use super::pictures::{DROPPED, KEPT, LEFT_ALONE, Pictures, colour_of};
 use super::plan;
-use super::section::{badge, document, figure, pairs, section, table};
+use super::section::{badge, document, figure, pairs, rows, section};
 use super::sheet::{Seen, Sheet};
 use super::words::{coordinate, counted, with_unit};
 use crate::failure::Failure;
@@ -22,7 +22,7 @@ pub fn page(sheet: &Sheet<'_>, name: &str) -> Result<String, Failure> {
         (head(sheet, name))
         (pictures(sheet, &fates)?)
         (section("Regions", &regions(sheet, &fates)))
-        @if !sheet.resolution.changes.is_empty() { (section("Changes of the map", &changes(sheet))) }
+        @if !sheet.resolution.changes.is_empty() { (section("Changes of the map", &changes(sheet)?)) }
         (section("Where", &html! {
             div class="two" {
                 figure { (plan::plan(sheet)) figcaption { (plan::key(sheet)) } }
@@ -42,7 +42,7 @@ pub fn outcome(sheet: &Sheet<'_>) -> String {
     let changed = counted(changes.len(), "change", "changes");
     match text(&sheet.document["decision"]) {
         "unreliable" => "The pose is not reliable, so nothing was compared and the map stays as it is.".to_owned(),
-        "nothing" if sheet.resolution.rejections.is_empty() => "Photo and map agree: nothing to update.".to_owned(),
+        "nothing" if sheet.resolution.rejections.is_empty() => "No change was found: nothing to update.".to_owned(),
         "nothing" => format!("Nothing to update: {rejected}."),
         "dry-run" => format!("A dry run: {changed} would be made, {rejected}; the map stays as it is."),
         "proposed" => format!("{changed} proposed for review, {rejected}."),
@@ -109,7 +109,7 @@ fn region_caption(regions: &[ChangeRegion]) -> Markup {
     html! {
         b { "Regions" }
         @if regions.is_empty() { ": none was found" } @else {
-            ": " (swatch(KEPT)) "kept " (swatch(DROPPED)) "dropped " (swatch([150, 150, 158])) "left alone"
+            ": " (swatch(KEPT)) "kept " (swatch(DROPPED)) "dropped " (swatch(LEFT_ALONE)) "left alone"
         }
     }
 }
@@ -151,8 +151,8 @@ fn regions(sheet: &Sheet<'_>, fates: &[Vec<Fate>]) -> Markup {
             html! { (became(sheet, seen, own)) },
         ]
     };
-    let rows: Vec<Vec<Markup>> = seen.regions.iter().enumerate().map(|(index, region)| row(index, region)).collect();
-    table(&["", "Map → photo", "Size", "Columns, rows", "What became of it"], &rows)
+    let lines: Vec<Vec<Markup>> = seen.regions.iter().enumerate().map(|(index, region)| row(index, region)).collect();
+    rows(&["", "Map → photo", "Size", "Columns, rows", "What became of it"], &lines)
 }
 
 fn became(sheet: &Sheet<'_>, seen: &Seen, fates: &[Fate]) -> Markup {
@@ -182,14 +182,19 @@ fn became(sheet: &Sheet<'_>, seen: &Seen, fates: &[Fate]) -> Markup {
     }
 }
 
-fn changes(sheet: &Sheet<'_>) -> Markup {
-    html! {
-        div class="changes" {
-            @for (index, change) in sheet.document["changes"].as_array().into_iter().flatten().enumerate() {
-                (numbers::change(change, index + 1))
-            }
-        }
+fn changes(sheet: &Sheet<'_>) -> Result<Markup, Failure> {
+    let overlay = Overlay::new(&sheet.capture.camera, sheet.located.localization.pose);
+    let labels = &sheet.capture.labels;
+    let pictures = Pictures::new(labels, labels, sheet.world.classes());
+    let mut cards = Vec::new();
+    for (index, change) in sheet.resolution.changes.iter().enumerate() {
+        let detail = match overlay.part(change) {
+            Some(bounds) => overlay.detail(&pictures.part(bounds)?, bounds, change),
+            None => html! {},
+        };
+        cards.push(numbers::change(&sheet.document["changes"][index], index + 1, &detail));
     }
+    Ok(html! { div class="changes" { @for card in &cards { (card) } } })
 }
 
 fn heat(sheet: &Sheet<'_>, name: &str) -> Result<Markup, Failure> {

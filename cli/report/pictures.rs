@@ -4,14 +4,15 @@ use super::fate::Fate;
 use super::sheet::Seen;
 use crate::failure::Failure;
 use resurvey_core::image::{LabelImage, Raster, colours_of_labels, write_label_png, write_rgb_png};
-use resurvey_schema::{ClassId, ClassTable};
+use resurvey_schema::{ClassId, ClassTable, PixelBox};
 
 /// Images are thinned to at most this many columns: enough for a screen, and a page stays small.
 const WIDEST_PX: u32 = 1280;
-/// Share of white in what stands in the background.
-const FADE: f64 = 0.82;
+/// Shares of grey and of white in what stands in the background, so that no colour there is taken for a finding.
+const GREY: f64 = 0.85;
+const FADE: f64 = 0.7;
 /// Where photo and view differ and no region was made of it.
-const LEFT_ALONE: [u8; 3] = [150, 150, 158];
+pub const LEFT_ALONE: [u8; 3] = [122, 132, 190];
 /// Regions that changed the map.
 pub const KEPT: [u8; 3] = [0, 150, 95];
 /// Regions that were dropped.
@@ -19,6 +20,7 @@ pub const DROPPED: [u8; 3] = [222, 110, 0];
 
 /// Photo and view of one capture, thinned alike.
 pub struct Pictures<'a> {
+    whole: &'a LabelImage,
     photo: LabelImage,
     view: LabelImage,
     classes: &'a ClassTable,
@@ -28,9 +30,9 @@ pub struct Pictures<'a> {
 
 impl<'a> Pictures<'a> {
     /// Pictures of `photo` and `view`, which have one size.
-    pub fn new(photo: &LabelImage, view: &LabelImage, classes: &'a ClassTable) -> Self {
+    pub fn new(photo: &'a LabelImage, view: &LabelImage, classes: &'a ClassTable) -> Self {
         let stride = photo.width().div_ceil(WIDEST_PX).max(1);
-        Self { photo: thinned(photo, stride), view: thinned(view, stride), classes, stride }
+        Self { whole: photo, photo: thinned(photo, stride), view: thinned(view, stride), classes, stride }
     }
 
     /// The labels of the photo.
@@ -87,6 +89,17 @@ impl<'a> Pictures<'a> {
         Ok(write_rgb_png(&self.pale())?)
     }
 
+    /// The labels of the photo inside `bounds`, at their full size.
+    pub fn part(&self, bounds: PixelBox) -> Result<Vec<u8>, Failure> {
+        let mut part = LabelImage::filled(bounds.width(), bounds.height(), ClassId::VOID.0);
+        for v in bounds.top..bounds.bottom.min(self.whole.height()) {
+            for u in bounds.left..bounds.right.min(self.whole.width()) {
+                part.set(u - bounds.left, v - bounds.top, self.whole.at(u, v));
+            }
+        }
+        Ok(write_label_png(&part, self.classes)?)
+    }
+
     /// Classes of the table that photo or view show, each with its share of the photo's pixels.
     pub fn shares(&self) -> Vec<(ClassId, f64)> {
         let mut counts = [(0_usize, 0_usize); 256];
@@ -112,7 +125,10 @@ impl<'a> Pictures<'a> {
 
     fn pale(&self) -> Raster<[u8; 3]> {
         let mut picture = colours_of_labels(&self.photo, self.classes);
-        picture.values_mut().iter_mut().for_each(|colour| *colour = mixed(*colour, [255; 3], FADE));
+        picture
+            .values_mut()
+            .iter_mut()
+            .for_each(|colour| *colour = mixed(mixed(*colour, [luma(*colour); 3], GREY), [255; 3], FADE));
         picture
     }
 
@@ -155,6 +171,11 @@ fn thinned(labels: &LabelImage, stride: u32) -> LabelImage {
     thin
 }
 
+/// How bright a colour is (ITU-R BT.601).
+fn luma([red, green, blue]: [u8; 3]) -> u8 {
+    (0.299 * f64::from(red) + 0.587 * f64::from(green) + 0.114 * f64::from(blue)).round() as u8
+}
+
 /// `share` of `other` in `colour`.
 fn mixed(colour: [u8; 3], other: [u8; 3], share: f64) -> [u8; 3] {
     let mix = |a: u8, b: u8| (f64::from(a) * (1.0 - share) + f64::from(b) * share).round() as u8;
@@ -175,7 +196,8 @@ mod tests {
     #[test]
     fn void_never_differs_and_shares_are_those_of_the_photo() {
         let classes = ClassTable::default();
-        let pictures = Pictures::new(&labels(2, &[0, 3, 255, 1]), &labels(2, &[0, 0, 0, 1]), &classes);
+        let photo = labels(2, &[0, 3, 255, 1]);
+        let pictures = Pictures::new(&photo, &labels(2, &[0, 0, 0, 1]), &classes);
         assert!((pictures.differing_share() - 0.25).abs() < 1e-12);
         let shares = pictures.shares();
         assert_eq!(shares.len(), 4);
@@ -185,7 +207,8 @@ mod tests {
     #[test]
     fn a_region_lies_where_its_mask_says() {
         let classes = ClassTable::default();
-        let pictures = Pictures::new(&labels(3, &[0; 6]), &labels(3, &[0; 6]), &classes);
+        let photo = labels(3, &[0; 6]);
+        let pictures = Pictures::new(&photo, &labels(3, &[0; 6]), &classes);
         let region = ChangeRegion {
             class_before: ClassId(0),
             class_after: ClassId(3),

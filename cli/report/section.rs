@@ -39,7 +39,7 @@ pub fn figure(png: &[u8], alt: &str, over: &Markup, caption: &Markup) -> Markup 
     }
 }
 
-/// A table that scrolls by itself where the screen is too narrow. Numbers stand right: columns from `numbers_from` on.
+/// A table that scrolls by itself where the screen is too narrow.
 pub fn table(heads: &[&str], rows: &[Vec<Markup>]) -> Markup {
     html! {
         div class="scroll" {
@@ -49,6 +49,11 @@ pub fn table(heads: &[&str], rows: &[Vec<Markup>]) -> Markup {
             }
         }
     }
+}
+
+/// A table of few rows with words in the last column; on a narrow screen each row becomes a block of its own.
+pub fn rows(heads: &[&str], rows: &[Vec<Markup>]) -> Markup {
+    html! { div class="rows" { (table(heads, rows)) } }
 }
 
 /// Pairs of a name and a value.

@@ -27,4 +27,4 @@ pub use capture::{Case, CaseSpec, TrueChange, Truth};
 pub use change::ChangeKind;
 pub use noise::NoiseLevel;
 pub use scene::{Scene, SceneKind};
-pub use suite::{Suite, write_case, write_map, write_suite};
+pub use suite::{Changes, Suite, full_suite, write_case, write_map, write_suite};

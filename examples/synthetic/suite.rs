@@ -12,25 +12,53 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Which changes the captures of a suite show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Changes {
+    /// All kinds that suit the scene in turn.
+    InTurn,
+    /// One kind alone.
+    Only(ChangeKind),
+    /// Every other capture none, the others all other kinds in turn: for false updates per capture.
+    HalfNone,
+}
+
+impl Changes {
+    /// The kinds on `scene`, one after another and then again.
+    fn kinds(self, scene: &Scene) -> Vec<ChangeKind> {
+        let suitable = ChangeKind::of(scene);
+        match self {
+            Self::InTurn => suitable,
+            Self::Only(kind) => vec![kind],
+            Self::HalfNone => {
+                let real = suitable.into_iter().filter(|kind| *kind != ChangeKind::None);
+                real.flat_map(|kind| [ChangeKind::None, kind]).collect()
+            }
+        }
+    }
+}
+
 /// A set of captures of one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Suite {
     /// The place.
     pub scene: SceneKind,
-    /// Everything random follows from it.
+    /// The place follows from it.
     pub seed: u64,
+    /// The captures follow from it.
+    pub capture_seed: u64,
     /// Number of captures.
     pub count: usize,
     /// How good labels, prior and map are.
     pub noise: NoiseLevel,
-    /// The one kind of change; `None` takes all that suit the scene in turn.
-    pub change: Option<ChangeKind>,
+    /// What they show.
+    pub changes: Changes,
 }
 
 impl Suite {
     /// What each capture of the suite is.
     pub fn specs(&self, scene: &Scene) -> Vec<CaseSpec> {
-        let kinds = self.change.map_or_else(|| ChangeKind::of(scene), |kind| vec![kind]);
+        let kinds = self.changes.kinds(scene);
         (0..self.count)
             .map(|index| {
                 let change = kinds[index % kinds.len()];
@@ -39,7 +67,7 @@ impl Suite {
                     name: format!("{place}-{}-{noise}-{index:03}", change.name().replace('_', "-")),
                     change,
                     noise: self.noise,
-                    seed: self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
+                    seed: self.capture_seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
                     grid_prior: false,
                 }
             })
@@ -84,6 +112,22 @@ pub fn write_suite(suite: &Suite, directory: &Path) -> anyhow::Result<Vec<PathBu
     let scene = Scene::new(suite.scene, suite.seed);
     write_map(&scene, directory)?;
     suite.specs(&scene).into_iter().map(|spec| write_case(&Case::new(&scene, spec)?, directory)).collect()
+}
+
+/// Suites of every kind of scene at light and field noise, `count` captures of each, every other one without a change.
+/// The two noises of a scene share its map, and no capture is the same with less noise.
+pub fn full_suite(seed: u64, count: usize) -> Vec<Suite> {
+    let of_scene = |scene| {
+        [(NoiseLevel::LIGHT, seed), (NoiseLevel::FIELD, !seed)].map(|(noise, capture_seed)| Suite {
+            scene,
+            seed,
+            capture_seed,
+            count,
+            noise,
+            changes: Changes::HalfNone,
+        })
+    };
+    SceneKind::ALL.into_iter().flat_map(of_scene).collect()
 }
 
 /// Latitude and longitude, degrees, of a grid position with a height above HKPD.

@@ -8,6 +8,7 @@ mod document;
 mod groups;
 mod maps;
 mod run;
+mod table_v;
 mod tables;
 mod text;
 

@@ -5,8 +5,8 @@ use super::cases::{self, Case};
 use super::contender::Field;
 use super::groups::groups;
 use super::maps::{Maps, check};
-use super::{csv, document, text};
-use crate::args::{Eval, PluginSearch};
+use super::{csv, document, table_v, text};
+use crate::args::{Eval, Experiment, PluginSearch};
 use crate::commands::write_file;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -26,8 +26,11 @@ pub struct Results<'a> {
     pub with_updates: bool,
 }
 
-/// Compares matchers on captures with truth.
+/// Compares matchers on captures with truth, or runs the experiment that is named.
 pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    if let Some(Experiment::TableV(options)) = &options.experiment {
+        return table_v::run(options, plugins, console);
+    }
     let field = Field::load(options, plugins)?;
     for [one, other] in field.twins() {
         console.message(&format!("warning: {one} and {other} are one plugin with the same settings"));

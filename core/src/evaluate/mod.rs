@@ -2,6 +2,7 @@
 
 mod bootstrap;
 mod changes;
+mod chart;
 mod difference;
 mod nees;
 mod pose_error;
@@ -11,6 +12,7 @@ mod truth;
 
 pub use bootstrap::{Bootstrap, Estimate, Interval, wilson_95};
 pub use changes::{ChangeScore, ChangeSummary, ChangeTally, ExpectedChange, FalseUpdate, FoundChange, score_changes};
+pub use chart::{Chart, Mark, Series};
 pub use difference::Difference;
 pub use nees::{Consistency, nees};
 pub use pose_error::{Level, PoseError};
