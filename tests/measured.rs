@@ -55,12 +55,11 @@ fn placed(place: &Place, camera: &Camera, name: &str) -> Value {
     let world = World { panels: vec![banner()], ..place.scene.world.clone() };
     let labels = picture(&world, camera).labels();
     let folder = place.path(name);
-    std::fs::create_dir_all(&folder).unwrap();
-    let write = |file: &str, bytes: &[u8]| std::fs::write(folder.join(file), bytes).unwrap();
-    write("labels.png", &label_png::encode(&labels, camera.width as usize).unwrap());
+    std::fs::create_dir_all(&folder).expect("a writable directory");
+    let write = |file: &str, bytes: &[u8]| std::fs::write(folder.join(file), bytes).expect("a writable file");
+    write("labels.png", &label_png::encode(&labels, camera.width as usize).expect("labels are a PNG"));
     let [e, n, h] = [0, 1, 2].map(|axis| place.scene.origin[axis] + camera.position[axis]);
-    let [yaw_deg, pitch_deg, roll_deg] =
-        [camera.yaw_rad, camera.pitch_rad, camera.roll_rad].map(|angle| angle.to_degrees());
+    let [yaw_deg, pitch_deg, roll_deg] = [camera.yaw_rad, camera.pitch_rad, camera.roll_rad].map(f64::to_degrees);
     let (width, height, focal) = (camera.width, camera.height, camera.focal_px);
     let capture = json!({
         "format": "resurvey.capture/1", "labels": "labels.png",

@@ -86,7 +86,7 @@ pub fn change(change: &Value, number_of: usize, detail: &Markup) -> Markup {
         let mut names: Vec<&String> = Vec::new();
         columns.iter().flatten().for_each(|(name, _)| {
             if !names.contains(&name) {
-                names.push(name)
+                names.push(name);
             }
         });
         let cell = |column: &Vec<(String, String)>, name: &String| {

@@ -17,5 +17,7 @@ mod models;
 mod page;
 mod plugin_files;
 mod priors;
+mod reports;
+mod table_v;
 mod updates;
 mod usage;

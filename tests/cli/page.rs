@@ -89,6 +89,7 @@ fn the_page_names_every_key_of_every_document() {
         bench.json("export", &[text(&out)]),
         bench.json("import", &[text(&out)]),
         resurvey(&["init", text(&bench.path("new.rsv")), "--json"]).ok().json(),
+        resurvey(&["eval", "table-v", "--json"]).ok().json(),
         resurvey(&["plugins", "list", "--json"]).ok().json(),
         resurvey(&["plugins", "info", "semantic", "--json"]).ok().json(),
         resurvey(&["man", text(&bench.path("man")), "--json"]).ok().json(),

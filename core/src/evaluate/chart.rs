@@ -59,8 +59,11 @@ impl Chart {
         let [left, top, right, bottom] = FIELD;
         text(&mut svg, [left, 32.0], "font-size=\"17\" font-weight=\"600\"", &self.title);
         self.draw_axes(&mut svg, &scale);
-        for (index, series) in self.series.iter().enumerate() {
-            draw_series(&mut svg, &scale, series, self.colour(index));
+        // Oracles last: where a curve lies on its oracle both are seen.
+        for mark in [Mark::Measured, Mark::Oracle] {
+            for (index, series) in self.series.iter().enumerate().filter(|(_, series)| series.mark == mark) {
+                draw_series(&mut svg, &scale, series, self.colour(index));
+            }
         }
         for (index, series) in self.series.iter().enumerate() {
             let y = top + 12.0 + 24.0 * index as f64;

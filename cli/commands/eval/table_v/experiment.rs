@@ -92,7 +92,7 @@ impl Experiment {
         let points = points(&thing, (detector, estimator), measure, oracle)?;
         Ok(Self {
             name: "banner",
-            title: "A banner of 6 × 4 m on a wall at 20 m",
+            title: "A banner of 6 × 4 m on a wall",
             quantity: "area too large by, %",
             unit: "%",
             oracle: "(1 + e/z)² − 1",

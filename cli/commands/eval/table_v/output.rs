@@ -61,8 +61,8 @@ pub fn chart(experiment: &Experiment) -> Chart {
     let measured = points.iter().map(|point| [point.pose_error_m, *point.measured.as_ref().unwrap_or(&f64::NAN)]);
     let oracle = points.iter().map(|point| [point.pose_error_m, point.oracle]);
     Chart {
-        title: experiment.title.to_owned(),
-        x_label: "error e of the pose, away from it, m".to_owned(),
+        title: format!("{}, {} m from the camera", experiment.title, experiment.range_m),
+        x_label: "error e of the pose, backing off, m".to_owned(),
         y_label: experiment.quantity.to_owned(),
         series: vec![
             Series { name: experiment.oracle.to_owned(), points: oracle.collect(), mark: Mark::Oracle },
