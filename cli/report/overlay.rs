@@ -113,13 +113,16 @@ impl<'a> Overlay<'a> {
                     @for (index, corner) in corners.into_iter().enumerate() {
                         @if let Some(at) = corner {
                             (self.dot(at, class))
-                            // Away from the middle: 1 and 4 to the left, 3 and 4 above.
-                            @let left = matches!(index, 0 | 3);
-                            @let side = if left { -0.45 } else { 0.45 };
-                            @let down = if index < 2 { 1.05 } else { -0.35 };
-                            text class={ "mark " (class) } x=(tenth(at[0] + side * self.letter_px))
-                                y=(tenth(at[1] + down * self.letter_px)) text-anchor=(if left { "end" } else { "start" }) {
-                                (index + 1)
+                            // The earlier state has no numbers: they would stand on those of the later one.
+                            @if class != "before" {
+                                // Away from the middle: 1 and 4 to the left, 3 and 4 above.
+                                @let left = matches!(index, 0 | 3);
+                                @let side = if left { -0.45 } else { 0.45 };
+                                @let down = if index < 2 { 1.05 } else { -0.35 };
+                                text class={ "mark " (class) } x=(tenth(at[0] + side * self.letter_px))
+                                    y=(tenth(at[1] + down * self.letter_px)) text-anchor=(if left { "end" } else { "start" }) {
+                                    (index + 1)
+                                }
                             }
                         }
                     }
