@@ -123,6 +123,8 @@ impl Sweep {
         let place = Scene::new(scene, seed);
         write_map(&place, directory)?;
         let folder = directory.join(format!("{}-{}-{value}", scene.name(), noise.name()));
+        // Captures of an earlier run would be evaluated with these.
+        ensure!(!folder.exists(), "{}: expected no such directory yet; name another --out", folder.display());
         for spec in suite.specs(&place) {
             let mut case = Case::new(&place, CaseSpec { grid_prior: true, ..spec })?;
             if noise == Noise::Prior {
