@@ -62,7 +62,7 @@ impl Chart {
         // Oracles last: where a curve lies on its oracle both are seen.
         for mark in [Mark::Measured, Mark::Oracle] {
             for (index, series) in self.series.iter().enumerate().filter(|(_, series)| series.mark == mark) {
-                draw_series(&mut svg, &scale, series, self.colour(index));
+                draw_series(&mut svg, &scale, series, (self.colour(index), self.extra(index)));
             }
         }
         for (index, series) in self.series.iter().enumerate() {
@@ -84,6 +84,16 @@ impl Chart {
             Mark::Measured => {
                 let before = self.series[..index].iter().filter(|series| series.mark == Mark::Measured).count();
                 COLOURS[before % COLOURS.len()]
+            }
+        }
+    }
+
+    /// By how much a curve is wider than the last one: curves that lie on each other all show.
+    fn extra(&self, index: usize) -> f64 {
+        match self.series[index].mark {
+            Mark::Oracle => 0.0,
+            Mark::Measured => {
+                self.series[index + 1..].iter().filter(|series| series.mark == Mark::Measured).count() as f64
             }
         }
     }
@@ -181,7 +191,8 @@ impl Ticks {
     }
 }
 
-fn draw_series(svg: &mut String, scale: &Scale, series: &Series, colour: &str) {
+fn draw_series(svg: &mut String, scale: &Scale, series: &Series, (colour, extra): (&str, f64)) {
+    let (width, radius) = (2.2 + 1.2 * extra, 4.0 + 1.2 * extra);
     let runs = series.points.split(|point| !is_drawn(point)).filter(|run| !run.is_empty());
     let dash = if series.mark == Mark::Oracle { " stroke-dasharray=\"7 5\"" } else { "" };
     for run in runs {
@@ -189,13 +200,15 @@ fn draw_series(svg: &mut String, scale: &Scale, series: &Series, colour: &str) {
         let path: Vec<String> = places.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
         let _ = writeln!(
             svg,
-            "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"{dash}/>",
+            "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width:.1}\"{dash}/>",
             path.join("L")
         );
         if series.mark == Mark::Measured {
             for [x, y] in places {
-                let _ =
-                    writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{colour}\" stroke=\"#fff\"/>");
+                let _ = writeln!(
+                    svg,
+                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"{colour}\" stroke=\"#fff\"/>"
+                );
             }
         }
     }
