@@ -59,7 +59,10 @@ fn the_default_search_finds_the_best_candidate_of_the_exact_one() {
         same += u64::from(is_same);
         worst_loss = worst_loss.max(exact - fast);
         if !is_same {
-            println!("{} {index}: {fast:.5} at {at_fast:?}, the exact search has {exact:.5} at {at_exact:?}", kind.name());
+            println!(
+                "{} {index}: {fast:.5} at {at_fast:?}, the exact search has {exact:.5} at {at_exact:?}",
+                kind.name()
+            );
         }
     }
     println!("{same} of {wanted} the same; the others lose at most {worst_loss:.5} of the score");

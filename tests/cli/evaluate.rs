@@ -266,7 +266,7 @@ fn matchers_and_settings_that_cannot_be_are_refused_with_what_can() {
     refused(&["--updates", "--detector", "magic"], 11, &["magic", "class-difference"]);
     refused(&["--matcher", "descriptors"], 12, &["descriptors", "matcher"]);
     refused(&["--matcher", "semantic:dice"], 2, &["NAME:KEY=VALUE", "\"dice\""]);
-    refused(&["--matcher", "semantic:dice=7"], 2, &["dice", "from 0 to 1"]);
+    refused(&["--matcher", "semantic:dice=7"], 2, &["dice", "from -1 to 1"]);
     refused(&["--matcher", "semantic:luck=1"], 2, &["luck", "known are"]);
     refused(&["--matcher", "prior:radius_m=5"], 2, &["prior has no settings"]);
     refused(&["--set", "gate.luck=1"], 2, &["gate has no setting"]);

@@ -18,7 +18,7 @@ use align::Alignment;
 use candidates::Sweep;
 use likeness::{Compared, Likeness};
 use refine::Objective;
-use resurvey_plugin::schema::{ClassId, Localization};
+use resurvey_plugin::schema::Localization;
 use resurvey_plugin::{Error, Host, Photo, Plugin, Searcher};
 pub use settings::Settings;
 
@@ -45,11 +45,6 @@ impl Searcher for Semantic {
     fn search(&mut self, host: &dyn Host, photo: &Photo<'_>) -> Result<Localization, Error> {
         let settings = &self.settings;
         let compared = Compared::new(host.classes(), settings);
-        if !photo_has(photo, &compared) {
-            return Err(Error(
-                "nothing in the photo can be compared: every pixel is void or of a class left out".into(),
-            ));
-        }
         let likeness = Likeness::new(settings);
         let sweep = Sweep { host, photo, settings, compared: &compared, likeness: &likeness };
         let coarse = sweep.run()?;
@@ -81,9 +76,4 @@ impl Searcher for Semantic {
             heat: coarse.heat,
         })
     }
-}
-
-fn photo_has(photo: &Photo<'_>, compared: &Compared) -> bool {
-    let rows = 0..photo.labels.height();
-    rows.flat_map(|v| photo.labels.row(v)).any(|&class| compared.in_photo(ClassId(class)))
 }
