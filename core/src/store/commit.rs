@@ -4,6 +4,7 @@ use super::commit_error::CommitError;
 use super::conflict::{LiveRow, check_conflicts, live_rows};
 use super::error::{Fault, StoreError};
 use super::feature_rows::{insert_geometries, write_rows};
+use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
 use super::rows::{VersionRow, check_classes, classes_at, head, insert_classes};
@@ -33,12 +34,38 @@ impl MapFile {
             if let Some(made) = made_before(connection, transaction)? {
                 return Ok(made);
             }
-            let record = make_version(connection, transaction, digest, now)?;
+            let record = make_unseen_version(connection, transaction, digest, now)?;
             if let Some(evidence) = evidence {
                 evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
             }
             Ok(record.version)
         })
+    }
+}
+
+/// Writes the next version, unless someone looked at a place that it changes since its base. An undo is not weighed
+/// against what was seen: it says that what was seen there is wrong.
+fn make_unseen_version(
+    connection: &Connection,
+    transaction: &UpdateTransaction,
+    evidence: Option<Digest>,
+    now: Timestamp,
+) -> Result<VersionRecord, Refused> {
+    let seen = match transaction.kind {
+        VersionKind::Revert => Vec::new(),
+        _ => looked_at_since(connection, transaction)?,
+    };
+    match make_version(connection, transaction, evidence, now) {
+        Err(WriteFault::Refused(CommitError::Conflict { base, head, changed, .. })) => {
+            refuse(CommitError::Conflict { base, head, changed, looked_at: seen })
+        }
+        Ok(record) if !seen.is_empty() => refuse(CommitError::Conflict {
+            base: transaction.base,
+            head: VersionId(record.version.0 - 1),
+            changed: Vec::new(),
+            looked_at: seen,
+        }),
+        other => other,
     }
 }
 
@@ -90,15 +117,26 @@ pub(super) fn make_version(
     if let Some(classes) = &transaction.classes {
         insert_classes(connection, record.version, classes)?;
     }
+    insert_looked_at(connection, record.version, transaction.viewed_region.as_ref())?;
     insert_geometries(connection, transaction)?;
     write_rows(connection, &plan, record.version)?;
     Ok(record)
 }
 
+impl MapFile {
+    /// The version that a transaction with this idempotency key made, if there is one.
+    pub fn made_with(&self, key: &str) -> Result<Option<VersionId>, StoreError> {
+        self.read(|connection| version_with(connection, key))
+    }
+}
+
 /// The version that the same idempotency key made before.
 fn made_before(connection: &Connection, transaction: &UpdateTransaction) -> Result<Option<VersionId>, Fault> {
+    transaction.idempotency_key.as_deref().map_or(Ok(None), |key| version_with(connection, key))
+}
+
+fn version_with(connection: &Connection, key: &str) -> Result<Option<VersionId>, Fault> {
     const SQL: &str = "SELECT version FROM version WHERE idempotency_key = :key ORDER BY version";
-    let Some(key) = &transaction.idempotency_key else { return Ok(None) };
     let mut statement = connection.prepare_cached(SQL)?;
     let made = statement.query_row(named_params! {":key": key}, |row| row.get::<_, i64>(0)).optional()?;
     Ok(made.map(|version| VersionId(version.unsigned_abs())))

@@ -8,7 +8,7 @@ use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId};
 #[non_exhaustive]
 pub enum CommitError {
     /// The map changed since the base version, or is not what the transaction takes it to be.
-    #[error("{}: {}", since(*base, *head), list(changed))]
+    #[error("{}: {}", since(*base, *head), list(changed, looked_at))]
     Conflict {
         /// The version the transaction was worked out against.
         base: VersionId,
@@ -16,6 +16,16 @@ pub enum CommitError {
         head: VersionId,
         /// What is not as expected, by rising feature number.
         changed: Vec<ConflictingChange>,
+        /// Versions after the base whose writers looked at a place that the transaction changes.
+        looked_at: Vec<VersionId>,
+    },
+    /// A version that did nothing there.
+    #[error("version {version} changed nothing{place}; there is nothing to undo")]
+    NothingToRevert {
+        /// The version.
+        version: VersionId,
+        /// ` in the region`, or nothing.
+        place: &'static str,
     },
     /// Nothing to commit.
     #[error("the transaction changes nothing; expected at least one feature or a class table")]
@@ -110,7 +120,7 @@ fn since(base: VersionId, head: VersionId) -> String {
     format!("the map changed between version {base} and version {head}")
 }
 
-fn list(changed: &[ConflictingChange]) -> String {
+fn list(changed: &[ConflictingChange], looked_at: &[VersionId]) -> String {
     const SHOWN: usize = 5;
     let one = |change: &ConflictingChange| {
         let place = if change.is_target { "" } else { " in the viewed region" };
@@ -119,9 +129,11 @@ fn list(changed: &[ConflictingChange]) -> String {
             None => format!("feature {} was never there", change.fid),
         }
     };
-    let mut text = changed.iter().take(SHOWN).map(one).collect::<Vec<_>>().join(", ");
-    if changed.len() > SHOWN {
-        text += &format!(" and {} more", changed.len() - SHOWN);
+    let seen = |version: &VersionId| format!("version {version} looked at a place that this changes");
+    let all: Vec<String> = changed.iter().map(one).chain(looked_at.iter().map(seen)).collect();
+    let mut text = all[..all.len().min(SHOWN)].join(", ");
+    if all.len() > SHOWN {
+        text += &format!(" and {} more", all.len() - SHOWN);
     }
     text
 }

@@ -2,6 +2,7 @@
 
 use super::commit_error::{CommitError, ConflictingChange};
 use super::error::Fault;
+use super::forgotten::check_state;
 use super::index::IndexOrigin;
 use super::map_file::WriteFault;
 use super::snapshot::feature_at;
@@ -43,6 +44,8 @@ pub(super) fn check_conflicts(
 ) -> Result<(), WriteFault<CommitError>> {
     let mut changed = BTreeMap::new();
     if let Some(region) = &transaction.viewed_region {
+        // Of what changed since a forgotten version not every trace is left.
+        check_state(connection, transaction.base)?;
         for fid in changed_since(connection, region, transaction.base)? {
             changed.insert(fid, false);
         }
@@ -65,7 +68,12 @@ pub(super) fn check_conflicts(
         Ok(ConflictingChange { fid, changed_in: last_change(connection, fid)?, found, is_target })
     };
     let changed = changed.into_iter().map(describe).collect::<Result<_, Fault>>()?;
-    Err(WriteFault::Refused(CommitError::Conflict { base: transaction.base, head, changed }))
+    Err(WriteFault::Refused(CommitError::Conflict {
+        base: transaction.base,
+        head,
+        changed,
+        looked_at: Vec::new(),
+    }))
 }
 
 /// Features in `region` whose state began or ended after `base`.

@@ -89,6 +89,22 @@ pub enum StoreError {
         /// The newest.
         head: VersionId,
     },
+    /// Forgotten by gc.
+    #[error("version {version} was forgotten; the next one that is kept is {next}")]
+    Forgotten {
+        /// What was asked for.
+        version: VersionId,
+        /// The first kept version after it.
+        next: VersionId,
+    },
+    /// A time of which only forgotten versions could tell.
+    #[error("what was seen at {time} is forgotten; ask for a time after version {next} was seen, or for a version")]
+    ForgottenTime {
+        /// What was asked for.
+        time: Timestamp,
+        /// The first kept version after the forgotten ones.
+        next: VersionId,
+    },
     /// Not in the map at that version.
     #[error("no feature {fid} at version {version}")]
     NoSuchFeature {

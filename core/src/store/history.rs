@@ -1,6 +1,7 @@
 //! Questions about history: versions, logs, differences, provenance.
 
 use super::error::{Fault, StoreError};
+use super::forgotten::check_state;
 use super::index::IndexOrigin;
 use super::map_file::MapFile;
 use super::observations::{self, RecordedObservation};
@@ -156,7 +157,8 @@ fn difference(
     to: VersionId,
     select: impl FnOnce(VersionId, VersionId) -> Result<(Vec<Feature>, Vec<Feature>), Fault>,
 ) -> Result<Vec<Delta>, Fault> {
-    check_version(connection, from.max(to))?;
+    check_state(connection, from.max(to))?;
+    check_state(connection, from.min(to))?;
     let (early, late) = (from.min(to), from.max(to));
     let (gone, come) = select(early, late)?;
     let mut sides: BTreeMap<Fid, Sides> = BTreeMap::new();

@@ -239,10 +239,15 @@ impl<E, F: Into<Fault>> From<F> for WriteFault<E> {
     }
 }
 
+/// The number of migrations that the file has had.
+pub(super) fn format_of(connection: &Connection) -> Result<usize, Fault> {
+    let format: i32 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+    Ok(format.max(0) as usize)
+}
+
 /// Applies the migrations that the file has not had.
 fn migrate(connection: &Connection) -> Result<(), WriteFault<StoreError>> {
-    let had: usize = connection.pragma_query_value(None, "user_version", |row| row.get::<_, i32>(0))?.max(0) as usize;
-    for migration in MIGRATIONS.iter().skip(had) {
+    for migration in MIGRATIONS.iter().skip(format_of(connection)?) {
         connection.execute_batch(migration)?;
     }
     connection.pragma_update(None, "user_version", MIGRATIONS.len() as i32)?;

@@ -1,6 +1,7 @@
 //! Names of versions: numbers, tags, `head`, dates.
 
 use super::error::{Fault, StoreError};
+use super::forgotten::check_state;
 use super::map_file::{MapFile, WriteFault};
 use super::rows::{head, timestamp};
 use super::snapshot::check_version;
@@ -28,13 +29,23 @@ impl MapFile {
             return Err(StoreError::TagName { name: name.to_owned() });
         }
         self.write(|connection| -> Result<(), WriteFault<StoreError>> {
-            check_version(connection, version)?;
+            check_state(connection, version)?;
             if let Some(taken) = tagged(connection, name)? {
                 return Err(StoreError::TagTaken { name: name.to_owned(), version: taken }.into());
             }
             let now = now.as_microsecond();
             connection.execute(SQL, named_params! {":name": name, ":version": version.0 as i64, ":now": now})?;
             Ok(())
+        })
+    }
+
+    /// Takes the name away from the version it names, and returns that.
+    pub fn untag(&self, name: &str) -> Result<VersionId, StoreError> {
+        const SQL: &str = "DELETE FROM tag WHERE name = :name";
+        self.write(|connection| -> Result<VersionId, WriteFault<StoreError>> {
+            let version = tagged(connection, name)?;
+            connection.execute(SQL, named_params! {":name": name})?;
+            version.ok_or_else(|| StoreError::NoSuchTag { name: name.to_owned() }.into())
         })
     }
 

@@ -1,6 +1,7 @@
 //! The map at one version, for reading.
 
 use super::error::{Fault, StoreError};
+use super::forgotten::check_state;
 use super::index::IndexOrigin;
 use super::map_file::MapFile;
 use super::rows::{FEATURE_COLUMNS, classes_at, feature, head};
@@ -11,8 +12,8 @@ use rusqlite::{Connection, OptionalExtension, ToSql, named_params};
 /// The map as it was at one version, whatever is committed meanwhile. It cannot write.
 #[derive(Debug)]
 pub struct Snapshot<'m> {
-    map: &'m MapFile,
-    version: VersionId,
+    pub(super) map: &'m MapFile,
+    pub(super) version: VersionId,
     classes: ClassTable,
 }
 
@@ -25,7 +26,7 @@ impl MapFile {
     /// The map at `version`.
     pub fn snapshot(&self, version: VersionId) -> Result<Snapshot<'_>, StoreError> {
         let classes = self.read(|connection| {
-            check_version(connection, version)?;
+            check_state(connection, version)?;
             classes_at(connection, version)
         })?;
         Ok(Snapshot { map: self, version, classes })

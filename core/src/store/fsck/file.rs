@@ -3,28 +3,28 @@
 use super::problem::Findings;
 use crate::store::error::Fault;
 use crate::store::index::IndexOrigin;
-use crate::store::map_file::FORMAT;
+use crate::store::map_file::{FORMAT, format_of};
 use resurvey_schema::sql::MIGRATIONS;
 use rusqlite::Connection;
 use std::collections::BTreeMap;
 
 /// Pages, indexes, column types, CHECK constraints and the inner structure of the R*Tree.
 pub(super) fn sqlite(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
-    let mut statement = connection.prepare("PRAGMA integrity_check")?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        let message: String = row.get(0)?;
-        if message != "ok" {
-            findings.add("file", message);
-        }
-    }
+    complaints(connection)?.into_iter().for_each(|complaint| findings.add("file", complaint));
     Ok(())
+}
+
+/// What SQLite's own check complains of.
+pub(in crate::store) fn complaints(connection: &Connection) -> Result<Vec<String>, Fault> {
+    let mut statement = connection.prepare("PRAGMA integrity_check")?;
+    let messages = statement.query_map([], |row| row.get(0))?.collect::<Result<Vec<String>, _>>()?;
+    Ok(messages.into_iter().filter(|message| message != "ok").collect())
 }
 
 /// Tables, indexes and triggers are those of the format, and no others.
 pub(super) fn schema(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
     let made = Connection::open_in_memory()?;
-    for migration in MIGRATIONS {
+    for migration in MIGRATIONS.iter().take(format_of(connection)?) {
         made.execute_batch(migration)?;
     }
     let (expected, found) = (definitions(&made)?, definitions(connection)?);

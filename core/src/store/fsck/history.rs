@@ -2,14 +2,13 @@
 
 use super::problem::Findings;
 use crate::store::error::Fault;
-use crate::store::rows::{FEATURE_COLUMNS, VersionRow, classes_at};
-use crate::store::snapshot::features;
-use crate::version::{
-    BoxMm, Counts, Delta, FeatureState, Fid, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash,
-};
+use crate::store::forgotten::{all_remains, remains_of};
+use crate::store::gc::{Unreachable, unreachable};
+use crate::store::operations::{deltas_of, operations_digest};
+use crate::store::rows::{VersionRow, classes_at, head};
+use crate::version::{BoxMm, Counts, Delta, VersionId, VersionKind, VersionRecord, version_hash};
 use resurvey_schema::ClassTable;
-use rusqlite::{Connection, named_params};
-use std::collections::BTreeMap;
+use rusqlite::Connection;
 
 /// Every class table can be read, and none drops a class of the one before or changes its kind.
 pub(super) fn classes(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
@@ -80,62 +79,75 @@ fn check_contents(
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let place = || format!("version {}", record.version);
-    let deltas = match deltas_of(connection, record.version) {
-        Ok(deltas) => deltas,
-        // A state that cannot be read is found by the check of the states.
-        Err(Fault::Damage(_)) => {
-            findings.add(place(), "cannot be recomputed, because a state cannot be read");
-            return Ok(());
-        }
-        Err(fault) => return Err(fault),
+    let operations = match remains_of(connection, record.version)? {
+        Some(remains) => remains.operations,
+        None => match deltas_of(connection, record.version) {
+            Ok(deltas) => {
+                check_sums(record, &deltas, findings);
+                operations_digest(connection, record.version, &deltas)?
+            }
+            // A state that cannot be read is found by the check of the states.
+            Err(Fault::Damage(_)) => {
+                findings.add(place(), "cannot be recomputed, because a state cannot be read");
+                return Ok(());
+            }
+            Err(fault) => return Err(fault),
+        },
     };
-    let counts = Counts::of(&deltas);
-    if counts != record.counts {
-        findings.add(place(), format!("says {:?}, its features say {counts:?}", record.counts));
-    }
-    let envelope = envelope_of(&deltas);
-    if envelope != record.envelope {
-        findings.add(place(), format!("has envelope {:?}, its features have {envelope:?}", record.envelope));
-    }
-    let frame = if last.is_none() { Some(frame(connection)?) } else { None };
-    let classes = new_classes(connection, record.version)?;
-    let mut operations = Operations::start(frame.as_ref(), classes.as_ref(), deltas.len() as u64);
-    deltas.iter().for_each(|delta| operations.add(delta));
-    let hash = version_hash(last.map(|last| last.hash), operations.finish(), record.evidence);
+    let hash = version_hash(last.map(|last| last.hash), operations, record.evidence);
     if hash != record.hash {
         findings.add(place(), format!("has hash {}, its operations and evidence give {hash}", record.hash));
     }
     Ok(())
 }
 
-/// What the rows that end and begin at `version` say it did.
-fn deltas_of(connection: &Connection, version: VersionId) -> Result<Vec<Delta>, Fault> {
-    const ENDED: &str = "f.to_version = :version AND f.to_version IS NOT NULL";
-    const BEGAN: &str = "f.from_version = :version";
-    let select = |condition| {
-        let sql = format!("SELECT {FEATURE_COLUMNS} FROM feature_version AS f WHERE {condition} ORDER BY f.fid");
-        features(connection, &sql, named_params! {":version": version.0 as i64})
-    };
-    let mut sides: BTreeMap<Fid, (Option<FeatureState>, Option<FeatureState>)> = BTreeMap::new();
-    select(ENDED)?.into_iter().for_each(|feature| sides.entry(feature.fid).or_default().0 = Some(feature.state));
-    select(BEGAN)?.into_iter().for_each(|feature| sides.entry(feature.fid).or_default().1 = Some(feature.state));
-    Ok(sides.into_iter().filter_map(|(fid, (before, after))| Delta::from_sides(fid, before, after)).collect())
+fn check_sums(record: &VersionRecord, deltas: &[Delta], findings: &mut Findings) {
+    let place = || format!("version {}", record.version);
+    let counts = Counts::of(deltas);
+    if counts != record.counts {
+        findings.add(place(), format!("says {:?}, its features say {counts:?}", record.counts));
+    }
+    let envelope = envelope_of(deltas);
+    if envelope != record.envelope {
+        findings.add(place(), format!("has envelope {:?}, its features have {envelope:?}", record.envelope));
+    }
+}
+
+/// Head and tagged versions are there, what follows a forgotten version says so, and no state is kept for forgotten
+/// versions alone.
+pub(super) fn forgotten(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
+    const TAGS: &str = "SELECT name, version FROM tag ORDER BY name";
+    let remains = all_remains(connection)?;
+    let is_gone = |version: &VersionId| remains.get(version).is_some_and(|remains| !remains.has_state);
+    let head = head(connection)?.version;
+    if is_gone(&head) {
+        findings.add(format!("version {head}"), "is the newest and forgotten");
+    }
+    let mut statement = connection.prepare(TAGS)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let (name, version): (String, i64) = (row.get(0)?, row.get(1)?);
+        if is_gone(&VersionId(version.unsigned_abs())) {
+            findings.add(format!("tag {name:?}"), format!("names version {version}, which is forgotten"));
+        }
+    }
+    for (version, remains_here) in &remains {
+        let before = VersionId(version.0.wrapping_sub(1));
+        if remains_here.has_state && !is_gone(&before) {
+            findings.add(format!("version {version}"), format!("is cut off from version {before}, which is there"));
+        }
+        let next = VersionId(version.0 + 1);
+        if !remains_here.has_state && next <= head && !remains.contains_key(&next) {
+            findings.add(format!("version {next}"), "follows a forgotten version and does not say so");
+        }
+    }
+    for Unreachable { fid, from, .. } in unreachable(connection)? {
+        findings.add(format!("feature {fid} from version {from}"), "is in no version that is kept");
+    }
+    Ok(())
 }
 
 fn envelope_of(deltas: &[Delta]) -> Option<BoxMm> {
     let states = deltas.iter().flat_map(|delta| delta.before().into_iter().chain(delta.after()));
     states.filter_map(|state| state.bounds().ok()).reduce(|all, bounds| all.union(&bounds))
-}
-
-fn frame(connection: &Connection) -> Result<Frame, Fault> {
-    const SQL: &str = "SELECT crs, vertical_datum FROM meta ORDER BY only_row";
-    Ok(connection.query_row(SQL, [], |row| Ok(Frame { crs: row.get(0)?, vertical_datum: row.get(1)? }))?)
-}
-
-/// The class table that `version` brought, if it brought one.
-fn new_classes(connection: &Connection, version: VersionId) -> Result<Option<ClassTable>, Fault> {
-    const SQL: &str = "SELECT EXISTS (SELECT 1 FROM class WHERE from_version = :version) ORDER BY 1";
-    let mut statement = connection.prepare_cached(SQL)?;
-    let is_new: bool = statement.query_row(named_params! {":version": version.0 as i64}, |row| row.get(0))?;
-    if is_new { classes_at(connection, version).map(Some) } else { Ok(None) }
 }

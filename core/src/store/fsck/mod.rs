@@ -7,3 +7,4 @@ mod history;
 mod problem;
 
 pub use problem::Problem;
+pub(super) use file::complaints as complaints_of_sqlite;

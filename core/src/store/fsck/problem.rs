@@ -53,7 +53,7 @@ impl Findings {
 type Check = fn(&Connection, &mut Findings) -> Result<(), Fault>;
 
 /// Every check by its name, the ground before what stands on it.
-const CHECKS: [(&str, Check); 13] = [
+const CHECKS: [(&str, Check); 14] = [
     ("sqlite", file::sqlite),
     ("schema", file::schema),
     ("references", file::references),
@@ -64,6 +64,7 @@ const CHECKS: [(&str, Check); 13] = [
     ("geometry", features::geometry),
     ("classes", history::classes),
     ("versions", history::versions),
+    ("forgotten", history::forgotten),
     ("observations", evidence::observations),
     ("proposals", evidence::proposals),
     ("tags", evidence::tags),

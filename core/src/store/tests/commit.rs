@@ -22,7 +22,7 @@ fn a_stale_base_version_is_refused() {
         is_target: true,
     }];
     let error = modify(&scratch, 1, 1, banner(0.7)).unwrap_err();
-    assert_eq!(error, CommitError::Conflict { base: VersionId(1), head: VersionId(2), changed });
+    assert_eq!(error, CommitError::Conflict { base: VersionId(1), head: VersionId(2), changed, looked_at: vec![] });
     assert!(error.to_string().contains("feature 1 (version 2)"), "{error}");
     assert_eq!((scratch.map.head(), scratch.live(1)), (Ok(VersionId(2)), banner(0.5)));
 }
