@@ -1,7 +1,12 @@
 //! The command line: names, options, units, defaults and help.
 
+mod history;
+
+pub use history::{Changes, Diff, DiffFormat, Gc, ProposalAction, Proposals, Retry, Revert, Tag};
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
+use resurvey_core::version::parse_moment;
 use std::path::PathBuf;
 
 /// Keeps a 3D city map current from phone photos.
@@ -48,8 +53,18 @@ pub enum Command {
     Query(Query),
     /// List versions that changed something, newest first; changes nothing
     Log(Log),
+    /// Show what differs between two versions, in a region or everywhere; changes nothing
+    Diff(Diff),
+    /// Undo one version, in a region or everywhere, by a new version
+    Revert(Revert),
+    /// Give a version a name, or list the names; changes nothing but names
+    Tag(Tag),
     /// Show the evidence behind a descriptor or object; changes nothing
     Why(Why),
+    /// Review updates that wait: list and show them; accept makes a new version, reject closes one
+    Proposals(Proposals),
+    /// Print what differs between two versions as a change set (JSON lines) for apply; changes nothing
+    Changes(Changes),
     /// Apply a change set (JSON lines) as one new version, or refuse it whole
     Apply(Apply),
     /// Write a version or region of the map to another format; changes nothing in the map
@@ -59,8 +74,10 @@ pub enum Command {
     /// List and describe plugins; changes nothing
     #[command(subcommand)]
     Plugins(Plugins),
-    /// Check everything that must hold in a map; changes nothing
+    /// Check everything that must hold in a map; changes nothing without --repair
     Fsck(Fsck),
+    /// Remove from the map file what nobody uses, and versions before one when asked to forget them
+    Gc(Gc),
     /// Print the completion script of a shell (never JSON)
     Completions(Completions),
     /// Write a manual page per command into a directory
@@ -109,12 +126,17 @@ pub struct Import {
     /// Index that means "unlabelled" in label textures
     #[arg(long, value_name = "INDEX")]
     pub void_index: Option<u8>,
+    /// When the model was surveyed, a date or a time with its zone, e.g. 2025-11-30; default: unknown
+    #[arg(long, value_name = "T", value_parser = moment)]
+    pub observed_at: Option<Timestamp>,
     /// Message of the version
     #[arg(long, value_name = "TEXT")]
     pub message: Option<String>,
     /// Who commits
     #[arg(long, value_name = "NAME", default_value = "resurvey")]
     pub author: String,
+    #[command(flatten)]
+    pub retry: Retry,
 }
 
 /// Up axis of a model.
@@ -236,6 +258,15 @@ pub struct Update {
     /// Do everything but write: the map stays as it is
     #[arg(long)]
     pub dry_run: bool,
+    /// Keep each change for review instead of committing it
+    #[arg(long, conflicts_with = "dry_run")]
+    pub propose: bool,
+    /// Keep each change for review until this many captures agree on it, and commit it then
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["dry_run", "propose"])]
+    pub confirm: Option<u64>,
+    /// A key of your own, with one capture: the same key again gives the version of the first time
+    #[arg(long, value_name = "KEY", conflicts_with_all = ["dry_run", "propose", "confirm"])]
+    pub idempotency_key: Option<String>,
     /// Also write an HTML page per capture and an index.html that links them, whatever the run comes to
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
@@ -280,6 +311,9 @@ pub struct Query {
     /// Version, tag, date or head
     #[arg(long, default_value = "head", value_name = "REV")]
     pub at: String,
+    /// What was there at this time as that version knows it, e.g. 2026-03-01: by when photos were taken, not committed
+    #[arg(long, value_name = "T", value_parser = moment)]
+    pub observed_at: Option<Timestamp>,
     /// Only this class; may be given again
     #[arg(long, value_name = "NAME")]
     pub class: Vec<String>,
@@ -334,6 +368,8 @@ pub struct Apply {
     pub map: PathBuf,
     /// Change set (resurvey.changes/1); - reads standard input
     pub file: PathBuf,
+    #[command(flatten)]
+    pub retry: Retry,
 }
 
 /// Arguments of `export`.
@@ -346,6 +382,9 @@ pub struct Export {
     /// Version, tag, date or head
     #[arg(long, default_value = "head", value_name = "REV")]
     pub at: String,
+    /// Only what differs between two versions: added green, removed red, changed yellow
+    #[arg(long, value_name = "REV..REV", conflicts_with = "at")]
+    pub diff: Option<String>,
     #[command(flatten)]
     pub region: Region,
 }
@@ -441,6 +480,9 @@ pub enum Plugins {
 pub struct Fsck {
     /// Map file
     pub map: PathBuf,
+    /// Mend the index and remove what nobody uses first; nothing else is touched
+    #[arg(long)]
+    pub repair: bool,
 }
 
 /// Arguments of `completions`.
@@ -462,6 +504,11 @@ pub struct Man {
 fn time(text: &str) -> Result<Timestamp, String> {
     let expected = "expected a time with its zone, such as 2026-06-01T10:28:00+08:00";
     text.parse().map_err(|_| format!("{expected}, found {text:?}"))
+}
+
+/// Parses a date, or a time with its zone.
+fn moment(text: &str) -> Result<Timestamp, String> {
+    parse_moment(text).map_err(|error| error.to_string())
 }
 
 /// Parses exactly `N` finite numbers with commas between them.

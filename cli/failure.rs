@@ -8,9 +8,10 @@ use resurvey_core::image::ImageError;
 use resurvey_core::localize::HeatMapError;
 use resurvey_core::mesh::{ClassMapError, EncodingError, ImportError};
 use resurvey_core::plugin::{PluginError, SettingsError};
-use resurvey_core::store::{CommitError, StoreError};
+use resurvey_core::store::{CommitError, ConflictingChange, StoreError};
 use resurvey_core::update::UpdateError;
-use resurvey_core::version::{ChangeSetError, InvalidBox};
+use resurvey_core::version::{ChangeSetError, InvalidBox, VersionId};
+use serde_json::{Value, json};
 use std::fmt;
 use std::path::Path;
 
@@ -38,28 +39,35 @@ pub const UNRELIABLE: u8 = 22;
 pub struct Failure {
     code: u8,
     error: anyhow::Error,
+    /// What machines are told, with --json.
+    document: Option<Box<Value>>,
 }
 
 impl Failure {
     /// An error of the kind that `code` stands for.
     pub fn new(code: u8, error: impl Into<anyhow::Error>) -> Self {
-        Self { code, error: error.into() }
+        Self { code, error: error.into(), document: None }
     }
 
     /// A wrong command line, in words.
     pub fn usage(text: impl fmt::Display) -> Self {
-        Self { code: USAGE, error: anyhow::anyhow!("{text}") }
+        Self::new(USAGE, anyhow::anyhow!("{text}"))
     }
 
     /// A wrong input file, in words.
     pub fn input(text: impl fmt::Display) -> Self {
-        Self { code: INPUT, error: anyhow::anyhow!("{text}") }
+        Self::new(INPUT, anyhow::anyhow!("{text}"))
     }
 
     /// The same, naming `file` where the message does not.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
         if self.to_string().contains(&place) { self } else { Self { error: self.error.context(place), ..self } }
+    }
+
+    /// What machines are told, once.
+    pub fn take_document(&mut self) -> Option<Value> {
+        self.document.take().map(|document| *document)
     }
 
     /// The exit code.
@@ -116,7 +124,7 @@ failure_from! {
 /// Results are the only thing written without the name of a file.
 impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
-        Self { code: INPUT, error: anyhow::Error::from(error).context("standard output") }
+        Self::new(INPUT, anyhow::Error::from(error).context("standard output"))
     }
 }
 
@@ -137,8 +145,12 @@ impl From<StoreError> for Failure {
             | StoreError::NoSuchFeature { .. }
             | StoreError::NeverAFeature { .. }
             | StoreError::NoSuchTag { .. }
+            | StoreError::NoSuchProposal { .. }
+            | StoreError::Forgotten { .. }
+            | StoreError::ForgottenTime { .. }
             | StoreError::BeforeFirst { .. } => MISSING,
-            StoreError::Revision(_) => USAGE,
+            StoreError::ProposalDecided { .. } => CONFLICT,
+            StoreError::Revision(_) | StoreError::TagName { .. } => USAGE,
             _ => INPUT,
         };
         Self::new(code, error)
@@ -148,14 +160,37 @@ impl From<StoreError> for Failure {
 impl From<CommitError> for Failure {
     fn from(error: CommitError) -> Self {
         match error {
-            CommitError::Conflict { .. } => {
+            CommitError::Conflict { base, head, ref changed, ref looked_at } => {
                 let next = "look at the features with \"resurvey query\" and work the change out again";
-                Self { code: CONFLICT, error: anyhow::anyhow!("{error}; {next}") }
+                let document = conflict(base, head, changed, looked_at);
+                let failure = Self::new(CONFLICT, anyhow::anyhow!("{error}; {next}"));
+                Self { document: Some(Box::new(document)), ..failure }
             }
+            CommitError::NothingToRevert { .. } => Self::new(NOTHING, error),
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
         }
     }
+}
+
+/// The document of a conflict.
+fn conflict(base: VersionId, head: VersionId, changed: &[ConflictingChange], looked_at: &[VersionId]) -> Value {
+    let one = |change: &ConflictingChange| {
+        json!({
+            "fid": change.fid.0,
+            "changed_in": change.changed_in.map(|version| version.0),
+            "is_on_map": change.found.is_some(),
+            "is_target": change.is_target,
+        })
+    };
+    json!({
+        "decision": "conflict",
+        "base_version": base.0,
+        "head": head.0,
+        "version": null,
+        "conflicts": changed.iter().map(one).collect::<Vec<_>>(),
+        "looked_at_by": looked_at.iter().map(|version| version.0).collect::<Vec<_>>(),
+    })
 }
 
 impl From<PluginError> for Failure {

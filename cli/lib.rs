@@ -14,7 +14,8 @@ mod tools;
 use args::{Cli, Command};
 use clap::Parser;
 use commands::{
-    apply, eval, evidence, export, fsck, generate, import, init, localize, log, plugins, query, render, update,
+    apply, changes, diff, eval, evidence, export, fsck, gc, generate, import, init, localize, log, plugins, proposals,
+    query, render, revert, tag, update,
 };
 use console::Console;
 use failure::{Failure, USAGE};
@@ -41,8 +42,19 @@ where
         Err(error) => return explain(&error, out, err),
     };
     let mut console = Console::new(out, err, cli.json, shows_progress);
-    let result = dispatch(&cli, &mut console).and_then(|code| Ok(console.out().flush().map(|()| code)?));
+    let result = dispatch(&cli, &mut console)
+        .or_else(|failure| tell(failure, &mut console))
+        .and_then(|code| Ok(console.out().flush().map(|()| code)?));
     exit_code(result, err)
+}
+
+/// Prints the document of a failure that has one, for machines.
+fn tell(mut failure: Failure, console: &mut Console<'_>) -> Result<u8, Failure> {
+    if let Some(document) = failure.take_document().filter(|_| console.is_json()) {
+        console.document(&document)?;
+        console.out().flush()?;
+    }
+    Err(failure)
 }
 
 /// The code of a result; says on standard error why it is none.
@@ -79,12 +91,18 @@ fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {
         Command::Update(options) => update::run(options, &cli.plugins, console),
         Command::Query(options) => query::run(options, console),
         Command::Log(options) => log::run(options, console),
+        Command::Diff(options) => diff::run(options, console),
+        Command::Revert(options) => revert::run(options, console),
+        Command::Tag(options) => tag::run(options, console),
         Command::Why(options) => evidence::run(options, console),
+        Command::Proposals(options) => proposals::run(options, console),
+        Command::Changes(options) => changes::run(options, console),
         Command::Apply(options) => apply::run(options, console),
         Command::Export(options) => export::run(options, console),
         Command::Eval(options) => eval::run(options, &cli.plugins, console),
         Command::Plugins(command) => plugins::run(command, &cli.plugins, console),
         Command::Fsck(options) => fsck::run(options, console),
+        Command::Gc(options) => gc::run(options, console),
         Command::Completions(options) => generate::completions(options, console),
         Command::Man(options) => generate::man(options, console),
     }

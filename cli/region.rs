@@ -5,8 +5,9 @@ use crate::failure::Failure;
 use geo::{Contains, Coord, LineString, Polygon};
 use geojson::{GeoJson, Value as Geometry};
 use resurvey_core::crs::Crs;
-use resurvey_core::version::BoxMm;
+use resurvey_core::version::{BoxMm, FeatureState};
 use resurvey_schema::{Descriptor, GridPoint, Wgs84};
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Heights of a region that names none, metres: below the deepest cavern, above the highest mast.
@@ -60,6 +61,32 @@ pub fn grid_point(crs: Crs, latitude_deg: f64, longitude_deg: f64) -> Result<Gri
 /// WGS84 position of a grid point.
 pub fn wgs84(crs: Crs, point: GridPoint) -> Result<Wgs84, Failure> {
     Ok(crs.wgs84_from_grid(point)?)
+}
+
+/// The GeoJSON geometry of a state in WGS84: a closed ring for a rectangle, a point for an object on the ground, the box
+/// in plan for an object of the model.
+pub fn geojson(crs: Crs, state: &FeatureState) -> Result<Value, Failure> {
+    let position = |point: GridPoint| -> Result<[f64; 3], Failure> {
+        let position = wgs84(crs, point)?;
+        Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
+    };
+    let ring = |corners: &[GridPoint]| -> Result<Value, Failure> {
+        let closed = corners.iter().chain(corners.first());
+        let ring = closed.map(|corner| position(*corner)).collect::<Result<Vec<_>, _>>()?;
+        Ok(json!({ "type": "Polygon", "coordinates": [ring] }))
+    };
+    match state {
+        FeatureState::Descriptor(Descriptor::Material(material)) => ring(&material.corners),
+        FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => {
+            Ok(json!({ "type": "Point", "coordinates": position(dynamic.position)? }))
+        }
+        FeatureState::Object { bounds, .. } => {
+            let [low, high] = bounds.corners();
+            let (west, south, east, north) = (low.easting_m, low.northing_m, high.easting_m, high.northing_m);
+            let corners = [(west, south), (east, south), (east, north), (west, north)];
+            ring(&corners.map(|(e, n)| GridPoint::new(e, n, low.height_m)))
+        }
+    }
 }
 
 /// A shape in plan that features are asked against after their boxes.

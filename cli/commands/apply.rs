@@ -18,7 +18,9 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
     let text = read(&options.file).map_err(|error| Failure::input(format!("{place}: {error}")))?;
     let changes = read_change_set(&text, map.snapshot(head)?.classes())
         .map_err(|error| Failure::input(format!("{place}: {error}")))?;
-    let committed = map.commit(&changes.into_transaction(head), Timestamp::now());
+    let mut transaction = changes.into_transaction(head);
+    transaction.idempotency_key.clone_from(&options.retry.idempotency_key);
+    let committed = map.commit(&transaction, Timestamp::now());
     let version = committed.map_err(|error| Failure::from(error).about(&options.file))?;
     let counts = map.version(version)?.counts;
     if console.is_json() {

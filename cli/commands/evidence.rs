@@ -6,7 +6,7 @@ use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
 use resurvey_core::store::{MapFile, Provenance, RecordedObservation};
-use resurvey_core::version::{Fid, Observation};
+use resurvey_core::version::{Fid, Observation, VersionId};
 use resurvey_schema::ClassTable;
 use serde_json::{Value, json};
 
@@ -17,12 +17,12 @@ pub fn run(options: &Why, console: &mut Console<'_>) -> Result<u8, Failure> {
     let snapshot = map.snapshot(map.head()?)?;
     let classes = snapshot.classes();
     if console.is_json() {
-        let steps = steps.iter().map(|step| document_of(step, classes)).collect::<Result<Vec<_>, _>>()?;
+        let steps = steps.iter().map(|step| document_of(&map, step, classes)).collect::<Result<Vec<_>, _>>()?;
         console.document(&json!({ "fid": options.fid, "steps": steps }))?;
         return Ok(0);
     }
     for step in &steps {
-        print(step, classes, console)?;
+        print(&map, step, classes, console)?;
     }
     Ok(0)
 }
@@ -35,7 +35,7 @@ fn op(step: &Provenance) -> &'static str {
     }
 }
 
-fn document_of(step: &Provenance, classes: &ClassTable) -> Result<Value, Failure> {
+fn document_of(map: &MapFile, step: &Provenance, classes: &ClassTable) -> Result<Value, Failure> {
     let side = |state: Option<&resurvey_core::version::FeatureState>| {
         state.map(|state| document::state(state, classes)).transpose()
     };
@@ -44,15 +44,41 @@ fn document_of(step: &Provenance, classes: &ClassTable) -> Result<Value, Failure
         "version": document::version(&step.record),
         "before": side(step.delta.before())?,
         "after": side(step.delta.after())?,
-        "observation": step.observation.as_ref().map(|recorded| observation(recorded, classes)),
+        "observation": step.observation.as_ref().map(|seen| observation(map, seen, classes)).transpose()?,
+        "reverted": step.record.reverts.map(|version| reverted(map, version, classes)).transpose()?,
     }))
 }
 
-fn observation(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
+/// The version that a step undoes, with its evidence.
+fn reverted(map: &MapFile, version: VersionId, classes: &ClassTable) -> Result<Value, Failure> {
+    let seen = map.observation_of(version)?;
+    Ok(json!({
+        "version": document::version(&map.version(version)?),
+        "observation": seen.map(|seen| observation(map, &seen, classes)).transpose()?,
+    }))
+}
+
+/// An observation with those it was confirmed by.
+pub(super) fn observation(
+    map: &MapFile,
+    recorded: &RecordedObservation,
+    classes: &ClassTable,
+) -> Result<Value, Failure> {
+    let mut document = single(recorded, classes);
+    let mut confirmed_by = Vec::new();
+    for digest in &recorded.observation.confirmations {
+        confirmed_by.push(map.observation_named(*digest)?.map(|seen| single(&seen, classes)));
+    }
+    document["confirmed_by"] = json!(confirmed_by);
+    Ok(document)
+}
+
+fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
     let Observation { capture, taken_at, prior, localization, plugins, gates, rejections, decision, .. } =
         &recorded.observation;
     json!({
         "id": recorded.id,
+        "sha256": recorded.digest.to_string(),
         "capture_sha256": capture.to_string(),
         "taken_at": taken_at.map(|time| time.to_string()),
         "recorded_at": recorded.recorded_at.to_string(),
@@ -80,20 +106,79 @@ fn observation(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
     })
 }
 
-fn print(step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
+fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
     let record = &step.record;
     let (version, kind, author) = (record.version, record.kind.name(), &record.author);
     console.line(format_args!("version {version}: {} by {kind}, {author}, {}", op(step), record.committed_at))?;
     console.line(format_args!("  message   {}", record.message))?;
-    let Some(recorded) = &step.observation else { return console.line("  evidence  none: not made from a capture") };
+    console.line(format_args!("  hash      {}", record.hash))?;
+    for (side, state) in [("before", step.delta.before()), ("after", step.delta.after())] {
+        if let Some(state) = state {
+            console.line(format_args!("  {side:9} {}", super::diff::words(state, classes)))?;
+        }
+    }
+    if let Some(reverted) = record.reverts {
+        console.line(format_args!("  undoes    version {reverted}: {}", map.version(reverted)?.message))?;
+        if let Some(seen) = map.observation_of(reverted)? {
+            print_observation(map, &seen, classes, console)?;
+        }
+        return Ok(());
+    }
+    match &step.observation {
+        Some(recorded) => print_observation(map, recorded, classes, console),
+        None => console.line("  evidence  none: not made from a capture"),
+    }
+}
+
+/// Prints an observation, and those it was confirmed by.
+pub(super) fn print_observation(
+    map: &MapFile,
+    recorded: &RecordedObservation,
+    classes: &ClassTable,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    print_single(recorded, classes, console)?;
+    let confirmations = &recorded.observation.confirmations;
+    for (place, digest) in confirmations.iter().enumerate() {
+        console.line(format_args!("  confirmed {} of {}", place + 1, confirmations.len()))?;
+        match map.observation_named(*digest)? {
+            Some(seen) => print_single(&seen, classes, console)?,
+            None => console.line(format_args!("  evidence  {digest} is not in the map"))?,
+        }
+    }
+    Ok(())
+}
+
+fn print_single(
+    recorded: &RecordedObservation,
+    classes: &ClassTable,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
     let seen = &recorded.observation;
     let taken = seen.taken_at.map_or_else(|| "unknown".to_owned(), |time| time.to_string());
     console.line(format_args!("  capture   sha256 {}, taken {taken}", seen.capture))?;
+    if let Some(digest) = recorded.labels {
+        console.line(format_args!("  labels    sha256 {digest}"))?;
+    }
     if let Some(prior) = &seen.prior {
         console.line(format_args!("  prior     {}", pose_text(&prior.pose)))?;
+        console.line(format_args!(
+            "            1 sigma {:.2} m in plan, {:.2} m in height, {:.1}° heading",
+            prior.position_sigma_m,
+            prior.height_sigma_m,
+            prior.yaw_sigma_rad.to_degrees()
+        ))?;
     }
     if let Some(found) = &seen.localization {
         console.line(format_args!("  pose      {}", pose_text(&found.pose)))?;
+        let [e, n, yaw] = [0, 1, 2].map(|axis| found.covariance[axis][axis].max(0.0).sqrt());
+        let score = found.score.map_or_else(|| "none: the pose was given".to_owned(), |score| format!("{score:.4}"));
+        let yaw_deg = yaw.to_degrees();
+        console.line(format_args!("            score {score}, 1 sigma E {e:.3} m N {n:.3} m heading {yaw_deg:.3}°"))?;
+        if let Some(other) = found.runner_up {
+            let (distance_m, ratio) = (other.distance_m, other.score_ratio);
+            console.line(format_args!("            runner-up {distance_m:.1} m away, {ratio:.3} of the score"))?;
+        }
     }
     for gate in &seen.gates {
         let verdict = if gate.passed { "passed" } else { "failed" };
@@ -105,6 +190,7 @@ fn print(step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> 
     for used in &seen.plugins {
         let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
         console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
+        console.line(format_args!("            {}", used.settings))?;
     }
     for rejection in &seen.rejections {
         let (before, after) = (classes.name(rejection.class_before), classes.name(rejection.class_after));

@@ -28,6 +28,8 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
         format!("import {}", names.join(", "))
     });
     let mut transaction = UpdateTransaction::new(head, VersionKind::Import, &options.author, message);
+    transaction.observed_at = options.observed_at;
+    transaction.idempotency_key.clone_from(&options.retry.idempotency_key);
     let mut reports = Vec::new();
     let stage = console.stage("import");
     for file in &options.files {

@@ -1,18 +1,25 @@
 //! One module per command.
 
 pub mod apply;
+pub mod changes;
+pub mod diff;
 pub mod eval;
 pub mod evidence;
 pub mod export;
 pub mod fsck;
+pub mod gc;
 pub mod generate;
 pub mod import;
 pub mod init;
 pub mod localize;
 pub mod log;
 pub mod plugins;
+pub mod proposals;
 pub mod query;
 pub mod render;
+pub mod revert;
+mod review;
+pub mod tag;
 pub mod update;
 
 use crate::failure::Failure;

@@ -62,9 +62,11 @@ fn features(options: &Query, snapshot: &Snapshot<'_>, crs: Crs) -> Result<Vec<Fe
         Some(shape) => Some(region::around(&shape.outline(), region::checked_heights(&options.region)?)?),
         None => region::bbox(&options.region, crs, options.wgs84)?,
     };
-    let found = match bounds {
-        Some(bounds) => snapshot.features_in(&bounds)?,
-        None => snapshot.features()?,
+    let found = match (bounds, options.observed_at) {
+        (Some(bounds), Some(time)) => snapshot.features_observed_in(time, &bounds)?,
+        (None, Some(time)) => snapshot.features_observed(time)?,
+        (Some(bounds), None) => snapshot.features_in(&bounds)?,
+        (None, None) => snapshot.features()?,
     };
     let wanted = |feature: &Feature| {
         let class = feature.state.class().map(|class| snapshot.classes().name(class));
@@ -193,32 +195,9 @@ impl Answer<'_> {
         Ok(())
     }
 
-    /// A GeoJSON feature in WGS84: a closed ring for a rectangle, a point for an object on the ground, a box for an
-    /// object of the model.
+    /// A GeoJSON feature in WGS84.
     fn geojson(&self, feature: &Feature) -> Result<Value, Failure> {
-        let position = |point: GridPoint| -> Result<[f64; 3], Failure> {
-            let position = region::wgs84(self.crs, point)?;
-            Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
-        };
-        let ring = |corners: &[GridPoint]| -> Result<Value, Failure> {
-            let closed = corners.iter().chain(corners.first());
-            let ring = closed.map(|corner| position(*corner)).collect::<Result<Vec<_>, _>>()?;
-            Ok(json!({ "type": "Polygon", "coordinates": [ring] }))
-        };
-        let geometry = match &feature.state {
-            FeatureState::Descriptor(Descriptor::Material(material)) => ring(&material.corners)?,
-            FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => {
-                json!({ "type": "Point", "coordinates": position(dynamic.position)? })
-            }
-            FeatureState::Object { bounds, .. } => {
-                let [low, high] = bounds.corners();
-                let (west, south, east, north, h) =
-                    (low.easting_m, low.northing_m, high.easting_m, high.northing_m, low.height_m);
-                ring(
-                    &[(west, south), (east, south), (east, north), (west, north)].map(|(e, n)| GridPoint::new(e, n, h)),
-                )?
-            }
-        };
+        let geometry = region::geojson(self.crs, &feature.state)?;
         let properties = document::feature(feature, self.classes)?;
         Ok(json!({ "type": "Feature", "id": feature.fid.0, "geometry": geometry, "properties": properties }))
     }

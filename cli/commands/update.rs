@@ -3,6 +3,7 @@
 use super::crs_of;
 use crate::args::{PluginSearch, PriorFrom, Update};
 use crate::commands::localize::pose_text;
+use crate::commands::review::{Review, repeated};
 use crate::console::{Console, Stage};
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
@@ -40,6 +41,12 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
             keep_labels: options.keep_labels,
             message: options.message.as_deref(),
             author: &options.author,
+            idempotency_key: options.idempotency_key.as_deref(),
+            review: match (options.propose, options.confirm) {
+                (_, Some(captures)) => Some(Review::Confirm(usize::try_from(captures).unwrap_or(usize::MAX))),
+                (true, None) => Some(Review::Propose),
+                (false, None) => None,
+            },
         };
         let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new() };
         match run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console) {
@@ -47,10 +54,11 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
                 code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
                 documents.push(document);
             }
-            Err(failure) => {
+            Err(mut failure) => {
                 if let Some(reports) = &mut reports {
                     reports.add_failure(path, &failure)?;
                 }
+                documents.extend(failure.take_document());
                 code = Err(failure);
                 break;
             }
@@ -73,6 +81,7 @@ fn refuse_one_for_several(options: &Update) -> Result<(), Failure> {
         ("--pose", options.pose.is_some()),
         ("--photo", options.prior.photo.is_some()),
         ("--at-time", options.prior.at_time.is_some()),
+        ("--idempotency-key", options.idempotency_key.is_some()),
     ];
     let count = options.captures.len();
     match of_one.into_iter().find(|(_, is_given)| *is_given && count > 1) {
@@ -134,6 +143,8 @@ pub(super) struct Recording<'a> {
     pub(super) keep_labels: bool,
     pub(super) message: Option<&'a str>,
     pub(super) author: &'a str,
+    pub(super) idempotency_key: Option<&'a str>,
+    pub(super) review: Option<Review>,
 }
 
 /// A capture that was read, and the map around it.
@@ -149,7 +160,7 @@ pub(super) struct Work {
 pub(super) struct Outcome {
     pub(super) located: Located,
     pub(super) resolution: Resolution,
-    viewed_region: Option<BoxMm>,
+    pub(super) viewed_region: Option<BoxMm>,
     /// `None` where the pose is not reliable.
     seen: Option<Seen>,
 }
@@ -163,6 +174,12 @@ impl Run<'_> {
         reports: Option<&mut Reports>,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
+        if let Some(document) = repeated(self.map, self.recording.idempotency_key, path)? {
+            if !console.is_json() {
+                console.line(format_args!("{}: committed before, version {}", path.display(), document["version"]))?;
+            }
+            return Ok((document, 0));
+        }
         let work = self.read(path, given, prior, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
@@ -284,24 +301,28 @@ impl Run<'_> {
             (true, false) => Decision::Committed,
         };
         if self.recording.dry_run {
-            return Ok(Committed { decision, version: None, fids: Vec::new() });
+            return Ok(Committed::nothing(decision));
         }
         let evidence = self.evidence(capture, is_given, outcome, used, decision);
         let now = Timestamp::now();
         if decision != Decision::Committed {
             self.map.record_observation(base, &evidence, now)?;
-            return Ok(Committed { decision, version: None, fids: Vec::new() });
+            return Ok(Committed::nothing(decision));
+        }
+        if let Some(review) = self.recording.review {
+            return self.put_forward(review, (base, capture), &evidence, outcome);
         }
         let message = self.recording.message.map_or_else(|| message_of(&outcome.resolution.changes), ToOwned::to_owned);
         let mut transaction = UpdateTransaction::new(base, VersionKind::Update, self.recording.author, message);
         transaction.observed_at = capture.taken_at;
         transaction.viewed_region = outcome.viewed_region;
         transaction.evidence = Some(evidence);
+        transaction.idempotency_key = self.recording.idempotency_key.map(ToOwned::to_owned);
         add_changes(&mut transaction, &outcome.resolution.changes);
         let version = self.map.commit(&transaction, now)?;
         let changes = self.map.changes_of(version)?;
         let fids = changes.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
-        Ok(Committed { decision, version: Some(version), fids })
+        Ok(Committed { decision, version: Some(version), fids, proposals: Vec::new() })
     }
 
     fn evidence(
@@ -329,6 +350,7 @@ impl Run<'_> {
             gates: outcome.located.gates.clone(),
             rejections: outcome.resolution.rejections.clone(),
             decision,
+            confirmations: Vec::new(),
         }
     }
 
@@ -354,10 +376,11 @@ impl Run<'_> {
             Decision::Unreliable => ("unreliable", UNRELIABLE),
             Decision::Nothing => ("nothing", NOTHING),
             _ if self.recording.dry_run => ("dry-run", 0),
+            Decision::Proposed => ("proposed", 0),
             _ => ("committed", 0),
         };
         let rejections = outcome.resolution.rejections.iter();
-        let document = json!({
+        let mut document = json!({
             "capture": path.display().to_string(),
             "base_version": work.base.0,
             "version": committed.version.map(|version| version.0),
@@ -368,6 +391,9 @@ impl Run<'_> {
             "plugins": used.iter().map(document::plugin_use).collect::<Vec<_>>(),
             "timings_ms": self.timings,
         });
+        if !committed.proposals.is_empty() {
+            document["proposals"] = json!(committed.proposals);
+        }
         if !console.is_json() {
             summary(path, &document, outcome, console)?;
         }
@@ -378,8 +404,15 @@ impl Run<'_> {
 /// What became of the changes.
 pub(super) struct Committed {
     pub(super) decision: Decision,
-    version: Option<VersionId>,
-    fids: Vec<u64>,
+    pub(super) version: Option<VersionId>,
+    pub(super) fids: Vec<u64>,
+    pub(super) proposals: Vec<u64>,
+}
+
+impl Committed {
+    fn nothing(decision: Decision) -> Self {
+        Self { decision, version: None, fids: Vec::new(), proposals: Vec::new() }
+    }
 }
 
 /// A pose that was given passes the gates, except inside a building: what it sees from there is no street.
@@ -412,7 +445,7 @@ pub(super) fn exactly(pose: Pose) -> Localization {
     }
 }
 
-fn message_of(changes: &[Change]) -> String {
+pub(super) fn message_of(changes: &[Change]) -> String {
     let count = |pick: fn(&Change) -> bool| changes.iter().filter(|change| pick(change)).count();
     let added = count(|change| matches!(change, Change::Add(_)));
     let modified = count(|change| matches!(change, Change::Modify { .. }));
@@ -424,6 +457,9 @@ fn summary(path: &Path, document: &Value, outcome: &Outcome, console: &mut Conso
     let decision = document["decision"].as_str().unwrap_or_default();
     let version = document["version"].as_u64().map_or_else(String::new, |version| format!(", version {version}"));
     console.line(format_args!("{}: {decision}{version}", path.display()))?;
+    for id in document["proposals"].as_array().into_iter().flatten() {
+        console.line(format_args!("  proposal  {id}"))?;
+    }
     console.line(format_args!("  pose      {}", pose_text(&outcome.located.localization.pose)))?;
     for reason in &outcome.located.reasons {
         console.line(format_args!("  doubt     {reason}"))?;

@@ -20,6 +20,9 @@ pub struct ChangeSetHeader {
     /// Why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
+    /// When the world was so, a time with its zone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observed_at: Option<String>,
 }
 
 /// What an operation does.

@@ -21,7 +21,14 @@ use std::path::Path;
 use std::time::Instant;
 
 /// What evaluation writes into its own maps.
-const RECORDING: Recording<'_> = Recording { dry_run: false, keep_labels: false, message: None, author: "eval" };
+const RECORDING: Recording<'_> = Recording {
+    dry_run: false,
+    keep_labels: false,
+    message: None,
+    author: "eval",
+    idempotency_key: None,
+    review: None,
+};
 
 /// A capture with what each contender made of it.
 pub struct Record {

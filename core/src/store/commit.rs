@@ -45,7 +45,7 @@ impl MapFile {
 
 /// Writes the next version, unless someone looked at a place that it changes since its base. An undo is not weighed
 /// against what was seen: it says that what was seen there is wrong.
-fn make_unseen_version(
+pub(super) fn make_unseen_version(
     connection: &Connection,
     transaction: &UpdateTransaction,
     evidence: Option<Digest>,

@@ -68,12 +68,7 @@ pub(super) fn check_conflicts(
         Ok(ConflictingChange { fid, changed_in: last_change(connection, fid)?, found, is_target })
     };
     let changed = changed.into_iter().map(describe).collect::<Result<_, Fault>>()?;
-    Err(WriteFault::Refused(CommitError::Conflict {
-        base: transaction.base,
-        head,
-        changed,
-        looked_at: Vec::new(),
-    }))
+    Err(WriteFault::Refused(CommitError::Conflict { base: transaction.base, head, changed, looked_at: Vec::new() }))
 }
 
 /// Features in `region` whose state began or ended after `base`.

@@ -192,11 +192,7 @@ fn unused_label_images(
     blobs_except(connection, "SELECT digest, length(bytes) FROM label_image ORDER BY digest", &used)
 }
 
-fn blobs_except(
-    connection: &Connection,
-    sql: &str,
-    used: &BTreeSet<[u8; 32]>,
-) -> Result<Vec<([u8; 32], u64)>, Fault> {
+fn blobs_except(connection: &Connection, sql: &str, used: &BTreeSet<[u8; 32]>) -> Result<Vec<([u8; 32], u64)>, Fault> {
     let mut statement = connection.prepare(sql)?;
     let blobs = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.unsigned_abs())))?;
     let mut unused = blobs.collect::<Result<Vec<([u8; 32], u64)>, _>>()?;

@@ -19,13 +19,15 @@ pub struct RecordedObservation {
     pub base: VersionId,
     /// When it came into the map.
     pub recorded_at: Timestamp,
+    /// Digest of its text, by which other observations name it.
+    pub digest: Digest,
     /// Digest of its label image, for [`MapFile::label_image`].
     pub labels: Option<Digest>,
     /// What was seen, without the label image.
     pub observation: Observation,
 }
 
-const COLUMNS: &str = "id, version, base_version, recorded_at, labels, body";
+const COLUMNS: &str = "id, version, base_version, recorded_at, labels, body, digest";
 
 impl MapFile {
     /// Keeps an attempt against `base` that made no version, and returns its number.
@@ -46,6 +48,19 @@ impl MapFile {
     pub fn observations(&self) -> Result<Vec<RecordedObservation>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM observation ORDER BY id DESC");
         self.read(|connection| select(connection, &sql, &[]))
+    }
+
+    /// The observation numbered `id`.
+    pub fn observation(&self, id: u64) -> Result<Option<RecordedObservation>, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM observation WHERE id = :id ORDER BY id");
+        let id = i64::try_from(id).unwrap_or(i64::MAX);
+        self.read(|connection| Ok(select(connection, &sql, &[(":id", &id)])?.pop()))
+    }
+
+    /// The first observation whose text has this digest.
+    pub fn observation_named(&self, digest: Digest) -> Result<Option<RecordedObservation>, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM observation WHERE digest = :digest ORDER BY id LIMIT 1");
+        self.read(|connection| Ok(select(connection, &sql, &[(":digest", &digest.0)])?.pop()))
     }
 
     /// The observation behind `version`, if it has one.
@@ -92,6 +107,7 @@ fn read(row: &Row) -> Result<RecordedObservation, Fault> {
         version: row.get::<_, Option<i64>>("version")?.map(|version| VersionId(version.unsigned_abs())),
         base: VersionId(row.get::<_, i64>("base_version")?.unsigned_abs()),
         recorded_at: timestamp(row.get("recorded_at")?)?,
+        digest: digest(row, "digest")?,
         labels: row.get::<_, Option<[u8; 32]>>("labels")?.map(Digest),
         observation: observation.map_err(|detail| Fault::Damage(format!("observation {id}: {detail}")))?,
     })
@@ -149,9 +165,18 @@ pub(super) fn digest_of(connection: &Connection, id: u64) -> Result<Digest, Faul
     Ok(connection.prepare_cached(SQL)?.query_row(named_params! {":id": id as i64}, |row| digest(row, "digest"))?)
 }
 
-/// Says that the observation numbered `id`, which made no version so far, made `version`.
+/// Says that the observation numbered `id` made `version`. One that made a version already, because several proposals
+/// stand on it, is written down once more.
 pub(super) fn link(connection: &Connection, id: u64, version: VersionId) -> Result<(), Fault> {
-    const SQL: &str = "UPDATE observation SET version = :version WHERE id = :id AND version IS NULL";
-    connection.prepare_cached(SQL)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    const LINK: &str = "UPDATE observation SET version = :version WHERE id = :id AND version IS NULL";
+    const COPY: &str = "INSERT INTO observation
+            (version, base_version, recorded_at, capture, decision, labels, body, digest)
+        SELECT :version, base_version, recorded_at, capture, decision, labels, body, digest FROM observation
+        WHERE id = :id ORDER BY id";
+    let linked =
+        connection.prepare_cached(LINK)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    if linked == 0 {
+        connection.prepare_cached(COPY)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    }
     Ok(())
 }

@@ -1,13 +1,14 @@
 //! Updates that wait for review: deltas against a base version that are not in the history yet.
 
-use super::commit::{check_request, check_states, make_version};
+use super::commit::{check_request, check_states, make_unseen_version, make_version};
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::{Evidence, digest_of, link};
 use super::rows::{box_columns, classes_at, head, read_box, timestamp};
 use crate::version::{
-    BoxMm, Delta, FeatureState, UpdateTransaction, VersionId, VersionKind, proposal_bytes, read_proposal_bytes,
+    BoxMm, Delta, FeatureState, Observation, UpdateTransaction, VersionId, VersionKind, proposal_bytes,
+    read_proposal_bytes,
 };
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, Row, ToSql, named_params};
@@ -58,20 +59,72 @@ impl MapFile {
     /// Keeps `transaction` for review and returns the number of the proposal; the same idempotency key again gives the
     /// proposal of the first time.
     pub fn propose(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<u64, CommitError> {
-        let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
-        self.write(|connection| -> Result<u64, WriteFault<CommitError>> {
-            if let Some(made) = proposed_before(connection, transaction)? {
-                return Ok(made);
-            }
+        let ids = self.keep(std::slice::from_ref(transaction), transaction.evidence.as_ref(), now)?;
+        Ok(ids.first().copied().unwrap_or_default())
+    }
+
+    /// Keeps each of `transactions` for review, all on the same evidence, and returns the numbers of the proposals in
+    /// their order.
+    pub fn propose_each(
+        &self,
+        transactions: &[UpdateTransaction],
+        evidence: &Observation,
+        now: Timestamp,
+    ) -> Result<Vec<u64>, CommitError> {
+        self.keep(transactions, Some(evidence), now)
+    }
+
+    fn keep(
+        &self,
+        transactions: &[UpdateTransaction],
+        evidence: Option<&Observation>,
+        now: Timestamp,
+    ) -> Result<Vec<u64>, CommitError> {
+        let evidence = evidence.map(Evidence::of).transpose()?;
+        self.write(|connection| -> Result<Vec<u64>, WriteFault<CommitError>> {
             let head = head(connection)?;
-            check_request(transaction, &head)?;
-            check_is_descriptors(transaction).map_err(WriteFault::Refused)?;
-            check_states(transaction, &classes_at(connection, head.version)?)?;
-            let observation = match evidence {
-                Some(evidence) => Some(evidence.insert(connection, transaction.base, None, now)?),
-                None => None,
-            };
-            Ok(insert(connection, transaction, observation, now)?)
+            let classes = classes_at(connection, head.version)?;
+            let (mut ids, mut observation) = (Vec::with_capacity(transactions.len()), None);
+            for transaction in transactions {
+                if let Some(made) = proposed_before(connection, transaction)? {
+                    ids.push(made);
+                    continue;
+                }
+                check_request(transaction, &head)?;
+                check_is_descriptors(transaction).map_err(WriteFault::Refused)?;
+                check_states(transaction, &classes)?;
+                if let (Some(evidence), None) = (&evidence, observation) {
+                    observation = Some(evidence.insert(connection, transaction.base, None, now)?);
+                }
+                ids.push(insert(connection, transaction, observation, now)?);
+            }
+            Ok(ids)
+        })
+    }
+
+    /// Commits `transaction`, on which the open proposals `ids` agree, and closes them with its version.
+    pub fn confirm(
+        &self,
+        ids: &[u64],
+        transaction: &UpdateTransaction,
+        note: &str,
+        now: Timestamp,
+    ) -> Result<VersionId, CommitError> {
+        let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
+        let digest = evidence.as_ref().map(|evidence| evidence.digest);
+        self.write(|connection| -> Result<VersionId, WriteFault<CommitError>> {
+            for id in ids {
+                open_one(connection, *id)?;
+            }
+            let record = make_unseen_version(connection, transaction, digest, now)?;
+            if let Some(evidence) = evidence {
+                evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
+            }
+            let decision = ProposalDecision::new(now, &transaction.author, note);
+            for id in ids {
+                decide(connection, *id, Some(record.version), &decision)?;
+            }
+            Ok(record.version)
         })
     }
 

@@ -69,6 +69,12 @@ pub fn resolve(proposals: Vec<Proposal>, regions: &[ChangeRegion], descriptors: 
     resolver.resolution
 }
 
+/// The descriptor of the map that `measured` is or replaces, if there is one.
+pub fn in_the_way(measured: &Descriptor, descriptors: &[(u64, Descriptor)]) -> Option<u64> {
+    let is_other = |present: &Descriptor| matches!(relation(present, measured), Relation::Unrelated);
+    descriptors.iter().find(|(_, present)| !is_other(present)).map(|(fid, _)| *fid)
+}
+
 struct Removal {
     region: u32,
     class: ClassId,

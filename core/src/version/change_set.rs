@@ -4,6 +4,7 @@ use super::{
     Delta, FeatureState, Fid, InvalidDescriptor, UpdateTransaction, VersionId, VersionKind, descriptor_from_file,
     descriptor_to_file,
 };
+use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, Op};
 
@@ -16,6 +17,8 @@ pub struct ChangeSet {
     pub author: Option<String>,
     /// Why.
     pub message: Option<String>,
+    /// When the world was so.
+    pub observed_at: Option<Timestamp>,
     /// Features without a number.
     pub additions: Vec<FeatureState>,
     /// Changes of numbered features.
@@ -32,6 +35,9 @@ pub enum ChangeSetError {
     /// Another format.
     #[error("line 1: expected format {FORMAT:?}, found {0:?}")]
     Format(String),
+    /// Not a time.
+    #[error("line 1: observed_at: expected a time with its zone such as 2026-03-01T10:00:00+08:00, found {0:?}")]
+    ObservedAt(String),
     /// Not JSON, or not of the right shape.
     #[error("line {line}: {detail}")]
     Syntax {
@@ -76,6 +82,7 @@ impl ChangeSet {
         let author = self.author.unwrap_or_default();
         let message = self.message.unwrap_or_default();
         let mut transaction = UpdateTransaction::new(self.base.unwrap_or(head), VersionKind::Apply, author, message);
+        transaction.observed_at = self.observed_at;
         transaction.additions = self.additions;
         transaction.deltas = self.deltas;
         transaction
@@ -93,10 +100,12 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
     if header.format != FORMAT {
         return Err(ChangeSetError::Format(header.format));
     }
+    let observed_at = header.observed_at.map(|text| text.parse().map_err(|_| ChangeSetError::ObservedAt(text)));
     let mut set = ChangeSet {
         base: header.base_version.map(VersionId),
         author: header.author,
         message: header.message,
+        observed_at: observed_at.transpose()?,
         additions: Vec::new(),
         deltas: Vec::new(),
     };
@@ -138,11 +147,12 @@ fn read_line(
     Ok(())
 }
 
-/// The change set of `deltas` as JSON lines, and the objects among them: change sets carry descriptors only.
+/// The change set of `deltas` as JSON lines, and the objects among them: change sets carry descriptors only. `classes`
+/// are the tables before and after.
 pub fn write_change_set(
     header: &ChangeSetHeader,
     deltas: &[Delta],
-    classes: &ClassTable,
+    classes: (&ClassTable, &ClassTable),
 ) -> Result<(String, Vec<Fid>), serde_json::Error> {
     let mut text = serde_json::to_string(header)? + "\n";
     let mut left_out = Vec::new();
@@ -156,13 +166,13 @@ pub fn write_change_set(
 }
 
 /// The line of `delta`; `None` when a side is an object.
-fn delta_to_line(delta: &Delta, classes: &ClassTable) -> Option<ChangeLine> {
-    let side = |state: Option<&FeatureState>| match state {
+fn delta_to_line(delta: &Delta, (before, after): (&ClassTable, &ClassTable)) -> Option<ChangeLine> {
+    let side = |state: Option<&FeatureState>, classes| match state {
         None => Some(None),
         Some(FeatureState::Descriptor(descriptor)) => Some(Some(descriptor_to_file(descriptor, classes))),
         Some(FeatureState::Object { .. }) => None,
     };
-    let (before, after) = (side(delta.before())?, side(delta.after())?);
+    let (before, after) = (side(delta.before(), before)?, side(delta.after(), after)?);
     let op = match (&before, &after) {
         (None, _) => Op::Add,
         (Some(_), None) => Op::Remove,
@@ -190,13 +200,15 @@ mod tests {
         ))
         .unwrap();
         assert_eq!((set.base, set.deltas.len()), (Some(VersionId(3)), 2));
+        let classes = ClassTable::default();
         let header = ChangeSetHeader {
             format: FORMAT.to_owned(),
             base_version: Some(3),
             author: set.author.clone(),
             message: set.message.clone(),
+            observed_at: None,
         };
-        let (text, left_out) = write_change_set(&header, &set.deltas, &ClassTable::default()).unwrap();
+        let (text, left_out) = write_change_set(&header, &set.deltas, (&classes, &classes)).unwrap();
         assert_eq!((read_change_set(&text, &ClassTable::default()), left_out), (Ok(set), vec![]));
     }
 
@@ -207,7 +219,8 @@ mod tests {
         let tower = FeatureState::Object { name: "tower".to_owned(), geometry, bounds };
         let header = serde_json::from_str(HEADER).unwrap();
         let deltas = [Delta::add(Fid(7), tower)];
-        let (text, left_out) = write_change_set(&header, &deltas, &ClassTable::default()).unwrap();
+        let classes = ClassTable::default();
+        let (text, left_out) = write_change_set(&header, &deltas, (&classes, &classes)).unwrap();
         assert_eq!((text.lines().count(), left_out), (1, vec![Fid(7)]));
     }
 

@@ -37,6 +37,8 @@ struct ObservationFile {
     gates: Vec<GateFile>,
     rejections: Vec<RejectionFile>,
     decision: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    confirmations: Vec<Digest>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -108,6 +110,7 @@ impl Observation {
             gates: self.gates.iter().map(gate_to_file).collect(),
             rejections: self.rejections.iter().map(rejection_to_file).collect(),
             decision: self.decision.name().to_owned(),
+            confirmations: self.confirmations.clone(),
         };
         serde_json::to_string(&file)
     }
@@ -130,6 +133,7 @@ impl Observation {
             gates: file.gates.into_iter().map(gate_from_file).collect(),
             rejections: file.rejections.into_iter().map(rejection_from_file).collect(),
             decision: decision.ok_or_else(|| format!("unknown decision {:?}", file.decision))?,
+            confirmations: file.confirmations,
         })
     }
 }

@@ -26,5 +26,5 @@ pub use operations::{Frame, Operations, version_hash};
 pub(crate) use operations::{proposal_bytes, read_proposal_bytes};
 pub use record::{Feature, VersionRecord};
 pub(crate) use revision::is_tag_name;
-pub use revision::{InvalidRevision, Revision};
+pub use revision::{InvalidRevision, Revision, parse_moment};
 pub use transaction::{Fid, UpdateTransaction, VersionId, VersionKind};

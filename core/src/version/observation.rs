@@ -26,6 +26,8 @@ pub struct Observation {
     pub rejections: Vec<Rejection>,
     /// What came of it.
     pub decision: Decision,
+    /// Digests of the observations that it was confirmed by, its own among them; empty for a single capture.
+    pub confirmations: Vec<Digest>,
 }
 
 /// The part of a localization that decisions rest on.

@@ -58,6 +58,11 @@ impl Revision {
     }
 }
 
+/// Reads a date (the end of that day, UTC) or a time with its zone, with or without the `@` of a revision.
+pub fn parse_moment(text: &str) -> Result<Timestamp, InvalidRevision> {
+    parse_time(text.strip_prefix('@').unwrap_or(text)).ok_or_else(|| InvalidRevision::Time(text.to_owned()))
+}
+
 /// The number in `12` or `v12`; `Some(None)` when it has too many digits.
 fn parse_number(text: &str) -> Option<Option<u64>> {
     let digits = text.strip_prefix('v').unwrap_or(text);

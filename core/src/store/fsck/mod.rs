@@ -6,5 +6,5 @@ mod file;
 mod history;
 mod problem;
 
-pub use problem::Problem;
 pub(super) use file::complaints as complaints_of_sqlite;
+pub use problem::Problem;

@@ -41,6 +41,7 @@ fn seen(capture: &[u8], labels: Option<&[u8]>) -> Observation {
         gates: Vec::new(),
         rejections: Vec::new(),
         decision: Decision::Committed,
+        confirmations: Vec::new(),
     }
 }
 

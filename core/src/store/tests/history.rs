@@ -234,6 +234,7 @@ fn observation(decision: Decision) -> Observation {
             unit: "m".to_owned(),
         }],
         decision,
+        confirmations: Vec::new(),
     }
 }
 

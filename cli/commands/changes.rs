@@ -1,0 +1,49 @@
+//! `resurvey changes`.
+
+use crate::args::Changes;
+use crate::console::Console;
+use crate::failure::Failure;
+use resurvey_core::store::MapFile;
+use resurvey_core::version::{VersionId, write_change_set};
+use resurvey_schema::changes::{ChangeSetHeader, FORMAT};
+
+/// Prints what leads from one version to another as a change set.
+pub fn run(options: &Changes, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open_read_only(&options.map)?;
+    let (from, to) = map.resolve_range(&options.range)?;
+    let deltas = map.changes(from, to)?;
+    let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
+    let header = header(&map, from, to)?;
+    let (text, left_out) = write_change_set(&header, &deltas, (before.classes(), after.classes()))?;
+    console.out().write_all(text.as_bytes())?;
+    if !left_out.is_empty() {
+        let names: Vec<String> = left_out.iter().map(ToString::to_string).collect();
+        console.message(&format!(
+            "warning: {} objects differ too ({}); a change set carries descriptors only, so import them there as well",
+            names.len(),
+            names.join(", ")
+        ));
+    }
+    if before.classes() != after.classes() {
+        console.message("warning: the class table differs too; a change set does not carry it");
+    }
+    Ok(0)
+}
+
+/// Author, message and time of the version where the set is what one version did.
+fn header(map: &MapFile, from: VersionId, to: VersionId) -> Result<ChangeSetHeader, Failure> {
+    let mut header = ChangeSetHeader {
+        format: FORMAT.to_owned(),
+        base_version: Some(from.0),
+        author: None,
+        message: Some(format!("changes {from}..{to} of map {}", map.info()?.map_id)),
+        observed_at: None,
+    };
+    if to.0 == from.0 + 1 {
+        let record = map.version(to)?;
+        header.author = Some(record.author);
+        header.message = Some(record.message);
+        header.observed_at = record.observed_at.map(|time| time.to_string());
+    }
+    Ok(header)
+}

@@ -1,0 +1,183 @@
+//! `resurvey proposals`.
+
+use super::diff::Sides;
+use crate::args::{ProposalAction, Proposals};
+use crate::commands::evidence;
+use crate::console::Console;
+use crate::failure::{CONFLICT, Failure};
+use comfy_table::{Table, presets};
+use jiff::Timestamp;
+use resurvey_core::store::{MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot};
+use resurvey_core::update::in_the_way;
+use resurvey_core::version::{BoxMm, Delta, FeatureState, Fid};
+use resurvey_schema::{ClassTable, Descriptor};
+use serde_json::{Value, json};
+
+/// Lists, shows and decides proposals.
+pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let id = || {
+        let expected = "expected the number of a proposal, as \"resurvey proposals MAP list\" prints it";
+        options.id.ok_or_else(|| Failure::usage(expected))
+    };
+    match options.action {
+        ProposalAction::List => list(options, console),
+        ProposalAction::Show => show(&MapFile::open_read_only(&options.map)?, id()?, console),
+        ProposalAction::Accept => accept(options, id()?, console),
+        ProposalAction::Reject => {
+            let id = id()?;
+            MapFile::open(&options.map)?.reject(id, &options.by, &options.note, Timestamp::now())?;
+            if console.is_json() {
+                console.document(&json!({ "id": id, "status": "rejected" }))?;
+            } else {
+                console.line(format_args!("proposal {id} is rejected"))?;
+            }
+            Ok(0)
+        }
+    }
+}
+
+fn list(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open_read_only(&options.map)?;
+    let snapshot = map.snapshot(map.head()?)?;
+    let mut proposals = map.proposals()?;
+    proposals.retain(|proposal| options.all || proposal.status == ProposalStatus::Open);
+    if console.is_json() {
+        let entries = proposals.iter().map(|proposal| document(&map, proposal, snapshot.classes()));
+        console.document(&json!({ "proposals": entries.collect::<Result<Vec<_>, _>>()? }))?;
+        return Ok(0);
+    }
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(["id", "status", "proposed", "author", "change"]);
+    for proposal in &proposals {
+        let changes: Vec<String> = deltas(proposal).iter().map(|delta| change(delta, snapshot.classes())).collect();
+        table.add_row([
+            proposal.id.to_string(),
+            status(proposal).to_owned(),
+            proposal.proposed_at.to_string(),
+            proposal.transaction.author.clone(),
+            changes.join("; "),
+        ]);
+    }
+    console.line(table.trim_fmt())?;
+    Ok(0)
+}
+
+fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let proposal = map.proposal(id)?;
+    let snapshot = map.snapshot(map.head()?)?;
+    let classes = snapshot.classes();
+    let observation = observation(map, &proposal)?;
+    if console.is_json() {
+        let mut document = document(map, &proposal, classes)?;
+        let evidence = observation.as_ref().map(|seen| evidence::observation(map, seen, classes)).transpose()?;
+        document["observation"] = json!(evidence);
+        console.document(&document)?;
+        return Ok(0);
+    }
+    console.line(format_args!("proposal {id}: {}, by {}", status(&proposal), proposal.transaction.author))?;
+    console.line(format_args!("  message   {}", proposal.transaction.message))?;
+    console.line(format_args!("  base      version {}", proposal.transaction.base))?;
+    if let Some(decision) = &proposal.decision {
+        console.line(format_args!("  decided   {} by {}: {}", decision.at, decision.by, decision.note))?;
+    }
+    let sides = Sides { before: classes, after: classes };
+    for delta in deltas(&proposal) {
+        // Fid 0 stands for a number that the map has not given yet.
+        sides.text(&delta, console)?;
+    }
+    match &observation {
+        Some(seen) => evidence::print_observation(map, seen, classes, console)?,
+        None => console.line("  evidence  none: not made from a capture")?,
+    }
+    Ok(0)
+}
+
+fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let map = MapFile::open(&options.map)?;
+    let proposal = map.proposal(id)?;
+    if proposal.status == ProposalStatus::Open {
+        refuse_what_is_there(&map, &proposal)?;
+    }
+    let version = map.accept(id, &options.by, &options.note, Timestamp::now())?;
+    if console.is_json() {
+        console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;
+    } else {
+        console.line(format_args!("proposal {id} is accepted as version {version}"))?;
+    }
+    Ok(0)
+}
+
+/// Refuses to put on the map what another update put there since.
+fn refuse_what_is_there(map: &MapFile, proposal: &Proposal) -> Result<(), Failure> {
+    let snapshot = map.snapshot(map.head()?)?;
+    for state in &proposal.transaction.additions {
+        let FeatureState::Descriptor(added) = state else { continue };
+        if let Some(fid) = in_the_way(added, &descriptors_near(&snapshot, &state.bounds()?)?) {
+            let next = format!("look at both with \"resurvey why\" and \"proposals show {}\"", proposal.id);
+            let text = format!("feature {fid} is where proposal {} puts its own; {next}", proposal.id);
+            return Err(Failure::new(CONFLICT, anyhow::anyhow!(text)));
+        }
+    }
+    Ok(())
+}
+
+fn descriptors_near(snapshot: &Snapshot<'_>, bounds: &BoxMm) -> Result<Vec<(u64, Descriptor)>, Failure> {
+    let features = snapshot.features_in(bounds)?.into_iter();
+    let descriptor = |feature: resurvey_core::version::Feature| match feature.state {
+        FeatureState::Descriptor(descriptor) => Some((feature.fid.0, descriptor)),
+        FeatureState::Object { .. } => None,
+    };
+    Ok(features.filter_map(descriptor).collect())
+}
+
+fn observation(map: &MapFile, proposal: &Proposal) -> Result<Option<RecordedObservation>, Failure> {
+    Ok(proposal.observation.map_or(Ok(None), |id| map.observation(id))?)
+}
+
+/// Its changes; additions under number 0.
+fn deltas(proposal: &Proposal) -> Vec<Delta> {
+    let additions = proposal.transaction.additions.iter().map(|state| Delta::add(Fid(0), state.clone()));
+    proposal.transaction.deltas.iter().cloned().chain(additions).collect()
+}
+
+fn change(delta: &Delta, classes: &ClassTable) -> String {
+    let place = delta.after().or(delta.before()).map_or_else(String::new, |state| super::diff::words(state, classes));
+    match delta.before() {
+        None => format!("add {place}"),
+        Some(_) => format!("{} {} {place}", super::diff::op(delta), delta.fid()),
+    }
+}
+
+fn status(proposal: &Proposal) -> &'static str {
+    match proposal.status {
+        ProposalStatus::Open => "open",
+        ProposalStatus::Accepted(_) => "accepted",
+        ProposalStatus::Rejected => "rejected",
+    }
+}
+
+fn document(map: &MapFile, proposal: &Proposal, classes: &ClassTable) -> Result<Value, Failure> {
+    let sides = Sides { before: classes, after: classes };
+    let mut changes = deltas(proposal).iter().map(|delta| sides.document(delta)).collect::<Result<Vec<_>, _>>()?;
+    changes.iter_mut().filter(|change| change["fid"] == 0).for_each(|change| change["fid"] = Value::Null);
+    let version = match proposal.status {
+        ProposalStatus::Accepted(version) => Some(version.0),
+        _ => None,
+    };
+    let capture = observation(map, proposal)?.map(|seen| seen.observation.capture.to_string());
+    Ok(json!({
+        "id": proposal.id,
+        "status": status(proposal),
+        "proposed_at": proposal.proposed_at.to_string(),
+        "observed_at": proposal.transaction.observed_at.map(|time| time.to_string()),
+        "author": proposal.transaction.author,
+        "message": proposal.transaction.message,
+        "base_version": proposal.transaction.base.0,
+        "capture_sha256": capture,
+        "changes": changes,
+        "version": version,
+        "decision": proposal.decision.as_ref().map(|decision| json!({
+            "at": decision.at.to_string(), "by": decision.by, "note": decision.note,
+        })),
+    }))
+}
