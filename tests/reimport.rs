@@ -29,6 +29,7 @@ fn again(objects: &[Object], descriptors: &[Descriptor]) -> Imported {
         classes: &classes,
         objects: (1..).zip(objects).collect(),
         descriptors: (100..).zip(descriptors).collect(),
+        marks: std::collections::BTreeMap::new(),
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("export.glb");

@@ -5,73 +5,135 @@ use crate::args::Export;
 use crate::console::Console;
 use crate::failure::{Failure, MAP};
 use crate::region;
-use resurvey_core::export::{ExportScene, glb, gltf};
+use resurvey_core::export::{ExportScene, Mark, glb, gltf};
 use resurvey_core::mesh::{Object, decode_mesh};
 use resurvey_core::store::MapFile;
-use resurvey_core::version::FeatureState;
+use resurvey_core::version::{BoxMm, Delta, FeatureState, VersionId};
 use resurvey_schema::Descriptor;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Writes a version or a region of it.
+/// Writes a version, what differs between two, or a region of either.
 pub fn run(options: &Export, console: &mut Console<'_>) -> Result<u8, Failure> {
     let form = form(&options.out)?;
     let map = MapFile::open_read_only(&options.map)?;
-    let snapshot = map.snapshot(map.resolve(&options.at)?)?;
-    let features = match region::bbox(&options.region, crs_of(&map)?, false)? {
-        Some(bounds) => snapshot.features_in(&bounds)?,
-        None => snapshot.features()?,
+    let bounds = region::bbox(&options.region, crs_of(&map)?, false)?;
+    let mut things = Things::default();
+    let range = options.diff.as_deref().map(|range| map.resolve_range(range)).transpose()?;
+    let version = match range {
+        Some((from, to)) => things.add_difference(&map, (from, to), bounds.as_ref())?,
+        None => things.add_version(&map, map.resolve(&options.at)?, bounds.as_ref())?,
     };
-    let mut objects: Vec<(u64, Object)> = Vec::new();
-    let mut descriptors: Vec<(u64, Descriptor)> = Vec::new();
-    for feature in features {
-        let fid = feature.fid.0;
-        match feature.state {
-            FeatureState::Descriptor(descriptor) => descriptors.push((fid, descriptor)),
-            FeatureState::Object { name, geometry, .. } => {
-                let mesh = decode_mesh(&snapshot.geometry(geometry)?)
-                    .map_err(|error| Failure::new(MAP, anyhow::anyhow!("geometry of object {fid}: {error}")))?;
-                objects.push((fid, Object { name, mesh }));
-            }
-        }
-    }
-    let frame = map.info()?.frame;
+    let (snapshot, frame) = (map.snapshot(version)?, map.info()?.frame);
     let scene = ExportScene {
-        version: snapshot.version().0,
+        version: version.0,
         crs: &frame.crs,
         vertical_datum: &frame.vertical_datum,
         classes: snapshot.classes(),
-        objects: objects.iter().map(|(fid, object)| (*fid, object)).collect(),
-        descriptors: descriptors.iter().map(|(fid, descriptor)| (*fid, descriptor)).collect(),
+        objects: things.objects.iter().map(|(fid, object)| (*fid, object)).collect(),
+        descriptors: things.descriptors.iter().map(|(fid, descriptor)| (*fid, descriptor)).collect(),
+        marks: things.marks,
     };
-    let bytes = match form {
-        Form::Glb => {
-            let bytes = glb(&scene)?;
-            write_file(&options.out, &bytes)?;
-            bytes.len()
-        }
-        Form::Gltf => {
-            let buffer = options.out.with_extension("bin");
-            let name = buffer.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let files = gltf(&scene, &name)?;
-            write_file(&buffer, &files.buffer)?;
-            write_file(&options.out, &files.json)?;
-            files.json.len() + files.buffer.len()
-        }
-    };
-    let (version, out) = (snapshot.version().0, options.out.display());
-    let (objects, descriptors) = (objects.len(), descriptors.len());
+    let bytes = write(&scene, form, &options.out)?;
+    let (version, out) = (version.0, options.out.display());
+    let (objects, descriptors) = (things.objects.len(), things.descriptors.len());
     if console.is_json() {
-        console.document(&json!({
+        let mut document = json!({
             "version": version, "file": out.to_string(), "bytes": bytes,
             "objects": objects, "descriptors": descriptors,
-        }))?;
-    } else {
-        console.line(format_args!(
-            "{out}: version {version}, {objects} objects, {descriptors} descriptors, {bytes} bytes"
-        ))?;
+        });
+        if let Some((from, to)) = range {
+            document["from"] = json!(from.0);
+            document["to"] = json!(to.0);
+            for mark in Mark::ALL {
+                document[mark.name()] = json!(scene.marks.values().filter(|found| **found == mark).count());
+            }
+        }
+        console.document(&document)?;
+        return Ok(0);
     }
+    let what = range.map_or_else(|| format!("version {version}"), |(from, to)| format!("difference {from}..{to}"));
+    console.line(format_args!("{out}: {what}, {objects} objects, {descriptors} descriptors, {bytes} bytes"))?;
     Ok(0)
+}
+
+/// What is exported.
+#[derive(Default)]
+struct Things {
+    objects: Vec<(u64, Object)>,
+    descriptors: Vec<(u64, Descriptor)>,
+    marks: BTreeMap<u64, Mark>,
+}
+
+impl Things {
+    fn add_version(&mut self, map: &MapFile, at: VersionId, bounds: Option<&BoxMm>) -> Result<VersionId, Failure> {
+        let snapshot = map.snapshot(at)?;
+        let features = bounds.map_or_else(|| snapshot.features(), |bounds| snapshot.features_in(bounds))?;
+        for feature in features {
+            self.add(map, feature.fid.0, feature.state)?;
+        }
+        Ok(at)
+    }
+
+    /// What came and changed as it is after, what went as it was before. Classes are those of the later version, which
+    /// has every class of the earlier one.
+    fn add_difference(
+        &mut self,
+        map: &MapFile,
+        (from, to): (VersionId, VersionId),
+        bounds: Option<&BoxMm>,
+    ) -> Result<VersionId, Failure> {
+        let deltas = match bounds {
+            Some(bounds) => map.changes_in(from, to, bounds)?,
+            None => map.changes(from, to)?,
+        };
+        for delta in deltas {
+            let fid = delta.fid().0;
+            let mark = match (delta.before(), delta.after()) {
+                (None, _) => Mark::Added,
+                (_, None) => Mark::Removed,
+                _ => Mark::Changed,
+            };
+            self.marks.insert(fid, mark);
+            let state = |delta: &Delta| delta.after().or(delta.before()).cloned();
+            if let Some(state) = state(&delta) {
+                self.add(map, fid, state)?;
+            }
+        }
+        Ok(from.max(to))
+    }
+
+    fn add(&mut self, map: &MapFile, fid: u64, state: FeatureState) -> Result<(), Failure> {
+        match state {
+            FeatureState::Descriptor(descriptor) => self.descriptors.push((fid, descriptor)),
+            FeatureState::Object { name, geometry, .. } => {
+                let mesh = decode_mesh(&map.geometry(geometry)?)
+                    .map_err(|error| Failure::new(MAP, anyhow::anyhow!("geometry of object {fid}: {error}")))?;
+                self.objects.push((fid, Object { name, mesh }));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes the files and returns their bytes.
+fn write(scene: &ExportScene<'_>, form: Form, out: &Path) -> Result<usize, Failure> {
+    match form {
+        Form::Glb => {
+            let bytes = glb(scene)?;
+            write_file(out, &bytes)?;
+            Ok(bytes.len())
+        }
+        Form::Gltf => {
+            let buffer = out.with_extension("bin");
+            let name = buffer.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let files = gltf(scene, &name)?;
+            write_file(&buffer, &files.buffer)?;
+            write_file(out, &files.json)?;
+            Ok(files.json.len() + files.buffer.len())
+        }
+    }
 }
 
 #[derive(Clone, Copy)]

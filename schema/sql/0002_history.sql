@@ -16,6 +16,8 @@ CREATE TABLE forgotten (
     version INTEGER PRIMARY KEY REFERENCES version (version),
     has_state INTEGER NOT NULL CHECK (has_state IN (0, 1)),
     operations BLOB NOT NULL CHECK (length(operations) = 32),
+    -- The highest number that a feature had by then: no number is given twice, also when all states under it are gone.
+    last_fid INTEGER NOT NULL CHECK (last_fid BETWEEN 0 AND 9007199254740991),
     forgotten_at INTEGER NOT NULL
 ) STRICT;
 
@@ -35,7 +37,7 @@ WHEN NEW.has_state = 0 AND (
     NEW.version = (SELECT max(version) FROM version) OR EXISTS (SELECT 1 FROM tag WHERE tag.version = NEW.version))
 BEGIN SELECT RAISE (ABORT, 'head and tagged versions are not forgotten'); END;
 CREATE TRIGGER forgotten_is_final BEFORE UPDATE ON forgotten
-WHEN NEW.has_state = 1 OR NEW.version <> OLD.version OR NEW.operations <> OLD.operations
+WHEN NEW.has_state = 1 OR NEW.version <> OLD.version OR NEW.operations <> OLD.operations OR NEW.last_fid <> OLD.last_fid
 BEGIN SELECT RAISE (ABORT, 'what is forgotten stays so'); END;
 CREATE TRIGGER forgotten_is_kept BEFORE DELETE ON forgotten
 BEGIN SELECT RAISE (ABORT, 'what is forgotten stays so'); END;

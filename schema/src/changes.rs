@@ -52,6 +52,36 @@ pub struct ChangeLine {
     /// The state it makes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<DescriptorFile>,
+    /// The live state it expects of an object, instead of `before`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before_object: Option<ObjectFile>,
+    /// The state it makes of an object, instead of `after`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after_object: Option<ObjectFile>,
+}
+
+/// Geometry that objects of the set need, one line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GeometryLine {
+    /// SHA-256 of the bytes, 64 hexadecimal digits.
+    pub geometry: String,
+    /// The bytes as the map keeps them, base 64 (RFC 4648, section 4).
+    pub base64: String,
+}
+
+/// An object of the model as JSON has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectFile {
+    /// Name in the source.
+    pub name: String,
+    /// SHA-256 of its geometry, 64 hexadecimal digits.
+    pub geometry: String,
+    /// Lower ends of the box around it: easting, northing, height, millimetres.
+    pub min_mm: [i64; 3],
+    /// Upper ends.
+    pub max_mm: [i64; 3],
 }
 
 /// A descriptor as JSON has it: material when `corners` is there, dynamic when `position` is. Derived values (`centre`,

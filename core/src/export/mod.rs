@@ -4,4 +4,4 @@ mod gltf;
 mod scene;
 
 pub use gltf::{GltfFiles, glb, gltf};
-pub use scene::{ExportError, ExportScene};
+pub use scene::{ExportError, ExportScene, Mark};

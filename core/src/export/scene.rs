@@ -4,6 +4,7 @@ use crate::crs::CrsError;
 use crate::image::ImageError;
 use crate::mesh::Object;
 use resurvey_schema::{ClassTable, Descriptor};
+use std::collections::BTreeMap;
 
 /// Objects and descriptors of one version and region, with what is needed to read their numbers.
 #[derive(Clone, Debug)]
@@ -20,6 +21,42 @@ pub struct ExportScene<'a> {
     pub objects: Vec<(u64, &'a Object)>,
     /// Feature ids and descriptors, in the order of the export.
     pub descriptors: Vec<(u64, &'a Descriptor)>,
+    /// Features that are drawn in the material of what became of them instead of their classes'.
+    pub marks: BTreeMap<u64, Mark>,
+}
+
+/// What became of a feature between two versions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Mark {
+    /// It came.
+    Added,
+    /// It went.
+    Removed,
+    /// It is another.
+    Changed,
+}
+
+impl Mark {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Added, Self::Removed, Self::Changed];
+
+    /// Name of its material.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Added => "added",
+            Self::Removed => "removed",
+            Self::Changed => "changed",
+        }
+    }
+
+    /// Colour of its material, sRGB: green, red and yellow of Okabe & Ito's palette, which colour-blind people tell apart.
+    pub fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Added => [0, 158, 115],
+            Self::Removed => [213, 94, 0],
+            Self::Changed => [240, 228, 66],
+        }
+    }
 }
 
 /// Why a scene cannot be exported.

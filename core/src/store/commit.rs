@@ -3,7 +3,7 @@
 use super::commit_error::CommitError;
 use super::conflict::{LiveRow, check_conflicts, live_rows};
 use super::error::{Fault, StoreError};
-use super::feature_rows::{insert_geometries, write_rows};
+use super::feature_rows::{insert_geometries, last_fid, write_rows};
 use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
@@ -203,9 +203,7 @@ fn plan(
     transaction: &UpdateTransaction,
     live: BTreeMap<Fid, LiveRow>,
 ) -> Result<Plan, Refused> {
-    const SQL: &str = "SELECT coalesce(max(fid), 0) FROM feature_version ORDER BY 1";
-    let mut last: u64 = connection.prepare_cached(SQL)?.query_row([], |row| row.get::<_, i64>(0))?.unsigned_abs();
-    last = transaction.deltas.iter().map(|delta| delta.fid().0).fold(last, u64::max);
+    let mut last = transaction.deltas.iter().map(|delta| delta.fid().0).fold(last_fid(connection)?.0, u64::max);
     let mut deltas = Vec::with_capacity(transaction.deltas.len() + transaction.additions.len());
     for delta in &transaction.deltas {
         let before = live.get(&delta.fid()).map(|row| row.state.clone());

@@ -126,7 +126,7 @@ pub enum StoreError {
         name: String,
     },
     /// A name that has a version.
-    #[error("tag {name:?} names version {version} already")]
+    #[error("tag {name:?} names version {version} already; \"resurvey tag MAP {name} --delete\" takes it away")]
     TagTaken {
         /// The name.
         name: String,

@@ -40,6 +40,15 @@ pub(super) fn insert_geometries(
     Ok(())
 }
 
+/// The highest number that a feature has or had.
+pub(super) fn last_fid(connection: &Connection) -> Result<Fid, Fault> {
+    // Of several times of forgetting, the newest version that was forgotten knew of every feature of the older ones.
+    const SQL: &str = "SELECT max(coalesce((SELECT max(fid) FROM feature_version), 0),
+        coalesce((SELECT last_fid FROM forgotten ORDER BY version DESC LIMIT 1), 0)) ORDER BY 1";
+    let last: i64 = connection.prepare_cached(SQL)?.query_row([], |row| row.get(0))?;
+    Ok(Fid(last.unsigned_abs()))
+}
+
 /// Ends the rows that the plan replaces and writes the new ones, neighbours together.
 pub(super) fn write_rows(
     connection: &Connection,

@@ -1,6 +1,7 @@
 //! Forgetting old versions on request, and what nobody uses any more.
 
 use super::error::{Fault, StoreError};
+use super::feature_rows::last_fid;
 use super::forgotten::all_remains;
 use super::map_file::{MapFile, WriteFault};
 use super::operations::{deltas_of, operations_digest};
@@ -203,8 +204,9 @@ fn blobs_except(connection: &Connection, sql: &str, used: &BTreeSet<[u8; 32]>) -
 /// Keeps the digest of what each version did whose operations cannot be worked out any more: the forgotten ones and the
 /// first after them.
 fn forget(connection: &Connection, plan: &Plan, now: Timestamp) -> Result<(), Fault> {
-    const SQL: &str = "INSERT INTO forgotten (version, has_state, operations, forgotten_at)
-        VALUES (:version, :has_state, :operations, :now) ON CONFLICT (version) DO UPDATE SET has_state = 0";
+    const SQL: &str = "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at)
+        VALUES (:version, :has_state, :operations, :last_fid, :now) ON CONFLICT (version) DO UPDATE SET has_state = 0";
+    let last_fid = last_fid(connection)?;
     let cut_off = plan.forgotten.iter().map(|version| VersionId(version.0 + 1)).filter(|next| plan.kept.contains(next));
     let remembered = all_remains(connection)?;
     let touched: BTreeMap<VersionId, bool> =
@@ -217,7 +219,7 @@ fn forget(connection: &Connection, plan: &Plan, now: Timestamp) -> Result<(), Fa
         };
         connection.prepare_cached(SQL)?.execute(named_params! {
             ":version": version.0 as i64, ":has_state": has_state, ":operations": operations.0,
-            ":now": now.as_microsecond(),
+            ":last_fid": last_fid.0 as i64, ":now": now.as_microsecond(),
         })?;
     }
     Ok(())

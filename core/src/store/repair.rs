@@ -6,8 +6,8 @@ use super::index::{IndexBox, IndexOrigin, LIVE, hilbert_key};
 use super::map_file::{MapFile, WriteFault};
 use super::{Problem, fsck};
 use crate::version::{BoxMm, FeatureState};
-use rusqlite::{Connection, named_params};
-use std::collections::BTreeMap;
+use rusqlite::{Connection, Row, named_params};
+use std::collections::{BTreeMap, BTreeSet};
 
 impl MapFile {
     /// Mends the index and removes what nobody uses, all of it or nothing, and returns what it did. Everything else that
@@ -61,7 +61,11 @@ fn mend_index(connection: &Connection, done: &mut Vec<Problem>) -> Result<(), Fa
     const INSERT: &str = "INSERT INTO feature_index (id, e0, e1, n0, n1, h0, h1, v0, v1)
         VALUES (:id, :e0, :e1, :n0, :n1, :h0, :h1, :v0, :v1)";
     let mut wanted = wanted_rows(connection, done)?;
+    let unreadable = unreadable_rows(connection)?;
     for (id, found) in index_rows(connection)? {
+        if unreadable.contains(&id) {
+            continue;
+        }
         let expected = wanted.get(&id).map(|row| {
             let ([e0, e1, n0, n1, h0, h1], [v0, v1]) = (row.ends, row.versions);
             [e0, e1, n0, n1, h0, h1, v0, v1]
@@ -93,9 +97,8 @@ fn wanted_rows(connection: &Connection, done: &mut Vec<Problem>) -> Result<BTree
     let mut boxes: Vec<(i64, String, BoxMm, [i64; 2])> = Vec::new();
     while let Some(row) = rows.next()? {
         let (fid, from, to): (i64, i64, Option<i64>) = (row.get(1)?, row.get(2)?, row.get(3)?);
-        let state = FeatureState::from_bytes(row.get_ref(4)?.as_blob().map_err(rusqlite::Error::from)?);
         // A state that cannot be read has no box; fsck names it.
-        let Some(bounds) = state.ok().and_then(|state| state.bounds().ok()) else { continue };
+        let Some(bounds) = read_box(row, 4)? else { continue };
         let place = format!("feature {fid} from version {from}");
         boxes.push((row.get(0)?, place, bounds, [from, to.map_or(LIVE, |to| to - 1)]));
     }
@@ -115,6 +118,25 @@ fn wanted_rows(connection: &Connection, done: &mut Vec<Problem>) -> Result<BTree
         origin.to_index(&bounds).map(|ends| (id, Wanted { place, ends, versions }))
     };
     Ok(boxes.into_iter().filter_map(row).collect())
+}
+
+/// Rows whose state has no box, so that nothing says what the index should have of them.
+fn unreadable_rows(connection: &Connection) -> Result<BTreeSet<i64>, Fault> {
+    let mut statement = connection.prepare("SELECT id, state FROM feature_version ORDER BY id")?;
+    let mut rows = statement.query([])?;
+    let mut unreadable = BTreeSet::new();
+    while let Some(row) = rows.next()? {
+        if read_box(row, 1)?.is_none() {
+            unreadable.insert(row.get(0)?);
+        }
+    }
+    Ok(unreadable)
+}
+
+/// The box of the state in `column`, where it can be read.
+fn read_box(row: &Row, column: usize) -> Result<Option<BoxMm>, Fault> {
+    let state = FeatureState::from_bytes(row.get_ref(column)?.as_blob().map_err(rusqlite::Error::from)?);
+    Ok(state.ok().and_then(|state| state.bounds().ok()))
 }
 
 fn index_rows(connection: &Connection) -> Result<Vec<(i64, [i64; 8])>, Fault> {

@@ -1,12 +1,14 @@
-//! Change sets (`resurvey.changes/1`): deltas of descriptors as JSON lines, out of one map and into another.
+//! Change sets (`resurvey.changes/1`): deltas as JSON lines, out of one map and into another.
 
+use super::base64;
 use super::{
-    Delta, FeatureState, Fid, InvalidDescriptor, UpdateTransaction, VersionId, VersionKind, descriptor_from_file,
-    descriptor_to_file,
+    BoxMm, Delta, Digest, FeatureState, Fid, InvalidDescriptor, UpdateTransaction, VersionId, VersionKind,
+    descriptor_from_file, descriptor_to_file,
 };
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
-use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, Op};
+use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, GeometryLine, ObjectFile, Op};
+use std::collections::BTreeMap;
 
 /// A change set that was read and checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +25,8 @@ pub struct ChangeSet {
     pub additions: Vec<FeatureState>,
     /// Changes of numbered features.
     pub deltas: Vec<Delta>,
+    /// Geometry of its objects, under the digest of its bytes.
+    pub geometries: BTreeMap<Digest, Vec<u8>>,
 }
 
 /// Why a text is not a change set.
@@ -64,6 +68,14 @@ pub enum ChangeSetError {
         /// What was found.
         fid: u64,
     },
+    /// An object that is none.
+    #[error("line {line}: expected {expected}")]
+    Object {
+        /// Counted from 1.
+        line: usize,
+        /// What should have stood there.
+        expected: &'static str,
+    },
     /// A descriptor that is none.
     #[error("line {line}, {side}: {error}")]
     Descriptor {
@@ -85,6 +97,7 @@ impl ChangeSet {
         transaction.observed_at = self.observed_at;
         transaction.additions = self.additions;
         transaction.deltas = self.deltas;
+        transaction.geometries = self.geometries;
         transaction
     }
 }
@@ -108,8 +121,14 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
         observed_at: observed_at.transpose()?,
         additions: Vec::new(),
         deltas: Vec::new(),
+        geometries: BTreeMap::new(),
     };
     for (number, line) in lines {
+        if is_geometry(line) {
+            let geometry: GeometryLine = serde_json::from_str(line).map_err(syntax(number))?;
+            read_geometry(&geometry, number + 1, &mut set)?;
+            continue;
+        }
         let change: ChangeLine = serde_json::from_str(line).map_err(syntax(number))?;
         read_line(&change, number + 1, classes, &mut set)?;
     }
@@ -125,11 +144,19 @@ fn read_line(
     if let Some(fid) = change.fid.filter(|fid| !(1..=Fid::MAX.0).contains(fid)) {
         return Err(ChangeSetError::Fid { line, fid });
     }
-    let state = |side, file: &Option<DescriptorFile>| {
+    let state = |side, file: &Option<DescriptorFile>, object: &Option<ObjectFile>| {
         let read = |file| descriptor_from_file(file, classes).map(FeatureState::Descriptor);
-        file.as_ref().map(read).transpose().map_err(|error| ChangeSetError::Descriptor { line, side, error })
+        let invalid = |error| ChangeSetError::Descriptor { line, side, error };
+        match (file, object) {
+            (Some(_), Some(_)) => {
+                Err(ChangeSetError::Object { line, expected: "a descriptor or an object on each side, found both" })
+            }
+            (None, Some(object)) => object_from_file(object, line).map(Some),
+            (file, None) => file.as_ref().map(read).transpose().map_err(invalid),
+        }
     };
-    let (before, after) = (state("before", &change.before)?, state("after", &change.after)?);
+    let before = state("before", &change.before, &change.before_object)?;
+    let after = state("after", &change.after, &change.after_object)?;
     match (change.op, change.fid.map(Fid), before, after) {
         (Op::Add, None, None, Some(after)) => set.additions.push(after),
         (Op::Add, Some(fid), None, Some(after)) => set.deltas.push(Delta::add(fid, after)),
@@ -147,38 +174,69 @@ fn read_line(
     Ok(())
 }
 
-/// The change set of `deltas` as JSON lines, and the objects among them: change sets carry descriptors only. `classes`
-/// are the tables before and after.
+/// Whether a line of JSON has the key that only geometry has.
+fn is_geometry(line: &str) -> bool {
+    line.contains("\"base64\":")
+}
+
+fn read_geometry(file: &GeometryLine, line: usize, set: &mut ChangeSet) -> Result<(), ChangeSetError> {
+    let wrong = |expected| ChangeSetError::Object { line, expected };
+    let bytes = base64::decode(&file.base64).ok_or_else(|| wrong("base 64 with padding (RFC 4648)"))?;
+    let digest = Digest::of(&bytes);
+    if file.geometry.parse() != Ok(digest) {
+        return Err(wrong("the SHA-256 of its bytes as \"geometry\""));
+    }
+    set.geometries.insert(digest, bytes);
+    Ok(())
+}
+
+fn object_from_file(file: &ObjectFile, line: usize) -> Result<FeatureState, ChangeSetError> {
+    let wrong = |expected| ChangeSetError::Object { line, expected };
+    let geometry = file.geometry.parse().map_err(|_| wrong("a SHA-256 of 64 hexadecimal digits as \"geometry\""))?;
+    let bounds = BoxMm::from_mm(file.min_mm, file.max_mm);
+    let bounds = bounds.ok_or_else(|| wrong("\"min_mm\" not above \"max_mm\", both within a map"))?;
+    Ok(FeatureState::Object { name: file.name.clone(), geometry, bounds })
+}
+
+/// The change set of `deltas` as JSON lines. `classes` are the tables before and after, `geometries` what the objects
+/// need that come or change.
 pub fn write_change_set(
     header: &ChangeSetHeader,
     deltas: &[Delta],
     classes: (&ClassTable, &ClassTable),
-) -> Result<(String, Vec<Fid>), serde_json::Error> {
+    geometries: &BTreeMap<Digest, Vec<u8>>,
+) -> Result<String, serde_json::Error> {
     let mut text = serde_json::to_string(header)? + "\n";
-    let mut left_out = Vec::new();
-    for delta in deltas {
-        match delta_to_line(delta, classes) {
-            Some(line) => text += &(serde_json::to_string(&line)? + "\n"),
-            None => left_out.push(delta.fid()),
-        }
+    for (digest, bytes) in geometries {
+        let line = GeometryLine { geometry: digest.to_string(), base64: base64::encode(bytes) };
+        text += &(serde_json::to_string(&line)? + "\n");
     }
-    Ok((text, left_out))
+    for delta in deltas {
+        text += &(serde_json::to_string(&delta_to_line(delta, classes))? + "\n");
+    }
+    Ok(text)
 }
 
-/// The line of `delta`; `None` when a side is an object.
-fn delta_to_line(delta: &Delta, (before, after): (&ClassTable, &ClassTable)) -> Option<ChangeLine> {
-    let side = |state: Option<&FeatureState>, classes| match state {
-        None => Some(None),
-        Some(FeatureState::Descriptor(descriptor)) => Some(Some(descriptor_to_file(descriptor, classes))),
-        Some(FeatureState::Object { .. }) => None,
-    };
-    let (before, after) = (side(delta.before(), before)?, side(delta.after(), after)?);
-    let op = match (&before, &after) {
+fn delta_to_line(delta: &Delta, (before, after): (&ClassTable, &ClassTable)) -> ChangeLine {
+    let op = match (delta.before(), delta.after()) {
         (None, _) => Op::Add,
         (Some(_), None) => Op::Remove,
         (Some(_), Some(_)) => Op::Modify,
     };
-    Some(ChangeLine { op, fid: Some(delta.fid().0), before, after })
+    let (before, before_object) = side_to_file(delta.before(), before);
+    let (after, after_object) = side_to_file(delta.after(), after);
+    ChangeLine { fid: Some(delta.fid().0), before, after, before_object, after_object, op }
+}
+
+fn side_to_file(state: Option<&FeatureState>, classes: &ClassTable) -> (Option<DescriptorFile>, Option<ObjectFile>) {
+    match state {
+        None => (None, None),
+        Some(FeatureState::Descriptor(descriptor)) => (Some(descriptor_to_file(descriptor, classes)), None),
+        Some(FeatureState::Object { name, geometry, bounds }) => {
+            let (min_mm, max_mm) = (bounds.min(), bounds.max());
+            (None, Some(ObjectFile { name: name.clone(), geometry: geometry.to_string(), min_mm, max_mm }))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -208,20 +266,47 @@ mod tests {
             message: set.message.clone(),
             observed_at: None,
         };
-        let (text, left_out) = write_change_set(&header, &set.deltas, (&classes, &classes)).unwrap();
-        assert_eq!((read_change_set(&text, &ClassTable::default()), left_out), (Ok(set), vec![]));
+        let text = write_change_set(&header, &set.deltas, (&classes, &classes), &BTreeMap::new()).unwrap();
+        assert_eq!(read_change_set(&text, &ClassTable::default()), Ok(set));
     }
 
     #[test]
-    fn an_object_is_left_out_and_named() {
-        let bounds = crate::version::BoxMm::from_mm([0; 3], [1; 3]).unwrap();
-        let geometry = crate::version::Digest::of(b"");
-        let tower = FeatureState::Object { name: "tower".to_owned(), geometry, bounds };
+    fn an_object_comes_back_with_its_geometry() {
+        let bounds = BoxMm::from_mm([-5, 0, 7], [1, 1, 9]).unwrap();
+        let geometry = Digest::of(b"a mesh");
+        let tower = FeatureState::Object { name: "tower \"A\"".to_owned(), geometry, bounds };
         let header = serde_json::from_str(HEADER).unwrap();
-        let deltas = [Delta::add(Fid(7), tower)];
+        let deltas = [Delta::add(Fid(7), tower.clone()), Delta::remove(Fid(8), tower)];
         let classes = ClassTable::default();
-        let (text, left_out) = write_change_set(&header, &deltas, (&classes, &classes)).unwrap();
-        assert_eq!((text.lines().count(), left_out), (1, vec![Fid(7)]));
+        let geometries = BTreeMap::from([(geometry, b"a mesh".to_vec())]);
+        let text = write_change_set(&header, &deltas, (&classes, &classes), &geometries).unwrap();
+        let set = read_change_set(&text, &classes).unwrap();
+        assert_eq!((set.deltas.as_slice(), set.geometries), (&deltas[..], geometries));
+    }
+
+    #[test]
+    fn an_object_that_is_none_is_refused_by_its_line() {
+        let digest = Digest::of(b"").to_string();
+        let object = format!(r#"{{"name":"a","geometry":"{digest}","min_mm":[0,0,0],"max_mm":[1,1,1]}}"#);
+        let add = |object: &str| format!(r#"{{"op":"add","after_object":{object}}}"#);
+        for (line, expected) in [
+            (add(&object.replace("[0,0,0]", "[2,0,0]")), "expected \"min_mm\" not above \"max_mm\""),
+            (add(&object.replace(&digest, "abc")), "expected a SHA-256"),
+            (add(&object.replace("name", "title")), "unknown field `title`"),
+            (
+                format!(r#"{{"op":"add","after":{CHAIR},"after_object":{object}}}"#),
+                "expected a descriptor or an object",
+            ),
+            (r#"{"base64":""}"#.to_owned(), "missing field `geometry`"),
+            (format!(r#"{{"geometry":"{digest}","base64":"Z"}}"#), "expected base 64"),
+            (format!(r#"{{"geometry":"{digest}","base64":"Zg=="}}"#), "expected the SHA-256 of its bytes"),
+        ] {
+            let found = read(&line).unwrap_err().to_string();
+            assert!(
+                found.starts_with("line 2: ") && found.contains(expected),
+                "{line}\nexpected {expected}\nfound {found}"
+            );
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The values of history: version ids, deltas, update transactions. No SQL, no file.
 
+mod base64;
 mod box_mm;
 mod canonical;
 mod change_set;

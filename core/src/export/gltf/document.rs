@@ -68,16 +68,28 @@ enum Look<'a> {
     Surface(&'a Surface),
 }
 
+impl Look<'_> {
+    /// Its class; `None` where a label texture holds the classes.
+    fn class(&self) -> Option<ClassId> {
+        match self {
+            Self::Class(class) | Self::Surface(Surface::Class(class)) => Some(*class),
+            Self::Surface(Surface::Texture(_)) => None,
+        }
+    }
+}
+
 fn document(scene: &ExportScene) -> Result<Asset, ExportError> {
     let mut parts = Vec::with_capacity(scene.objects.len() + scene.descriptors.len());
     for &(fid, object) in &scene.objects {
         let shapes = shapes_of_object(fid, object)?;
         let shapes = shapes.into_iter().map(|(surface, shape)| (Look::Surface(surface), shape)).collect();
-        let extras = json!({ "fid": fid, "kind": Kind::Object.name(), "name": object.name });
+        let mut extras = json!({ "fid": fid, "kind": Kind::Object.name(), "name": object.name });
+        mark(&mut extras, fid, scene);
         parts.push(Part::new(fid, object.name.clone(), extras, Kind::Object, shapes)?);
     }
     for &(fid, descriptor) in &scene.descriptors {
-        let (kind, extras) = describe(fid, descriptor, scene)?;
+        let (kind, mut extras) = describe(fid, descriptor, scene)?;
+        mark(&mut extras, fid, scene);
         let name = format!("{} {fid}", scene.classes.name(descriptor.class()));
         let shapes = vec![(Look::Class(descriptor.class()), shape_of_descriptor(descriptor))];
         parts.push(Part::new(fid, name, extras, kind, shapes)?);
@@ -89,6 +101,13 @@ fn document(scene: &ExportScene) -> Result<Asset, ExportError> {
         Writer { scene, origin, asset: Asset::default(), materials: Materials::default(), table: Table::default() };
     let nodes = parts.iter().map(|part| writer.node(part)).collect::<Result<Vec<_>, _>>()?;
     writer.finish(nodes)
+}
+
+/// Says in its extras what became of a feature.
+fn mark(extras: &mut Value, fid: u64, scene: &ExportScene) {
+    if let Some(mark) = scene.marks.get(&fid) {
+        extras["difference"] = json!(mark.name());
+    }
 }
 
 impl<'a> Part<'a> {
@@ -154,7 +173,10 @@ impl<'a> Writer<'a, '_> {
         shape: &Shape,
         origin: &LocalOrigin,
     ) -> Result<Primitive, ExportError> {
-        let (class, material) = self.material(part.fid, look)?;
+        let (class, material) = match self.scene.marks.get(&part.fid) {
+            Some(mark) => (look.class(), self.materials.of_mark(&mut self.asset, *mark)),
+            None => self.material(part.fid, look)?,
+        };
         let (feature, extension) = self.table.push(Row { fid: part.fid, class, kind: part.kind })?;
         let positions = shape
             .vertices
@@ -167,7 +189,7 @@ impl<'a> Writer<'a, '_> {
             (Valid(Semantic::Positions), self.asset.push_positions(&positions)),
             (Valid(Semantic::Extras(feature::ATTRIBUTE.to_owned())), self.asset.push_vectors(&features)),
         ]);
-        if !shape.uvs.is_empty() {
+        if !shape.uvs.is_empty() && !self.scene.marks.contains_key(&part.fid) {
             attributes.insert(Valid(Semantic::TexCoords(0)), self.asset.push_vectors(&shape.uvs));
         }
         Ok(Primitive {

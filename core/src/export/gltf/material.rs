@@ -1,6 +1,6 @@
 //! Materials: one per class, named and coloured by it, and one per label texture.
 
-use super::super::ExportError;
+use super::super::{ExportError, Mark};
 use super::asset::Asset;
 use crate::image::write_label_png;
 use crate::mesh::{LabelTexture, Wrap};
@@ -20,6 +20,7 @@ pub(super) const LABELS_PREFIX: &str = "labels: ";
 #[derive(Debug, Default)]
 pub(super) struct Materials<'a> {
     by_class: BTreeMap<ClassId, Index<Material>>,
+    by_mark: BTreeMap<Mark, Index<Material>>,
     by_texture: BTreeMap<TextureKey<'a>, Index<Material>>,
     samplers: BTreeMap<(u8, u8), Index<Sampler>>,
 }
@@ -43,6 +44,16 @@ impl<'a> Materials<'a> {
                 PbrMetallicRoughness { base_color_factor: PbrBaseColorFactor([red, green, blue, 1.0]), ..matt() };
             asset.root.push(unlit(class.name.clone(), surface))
         }))
+    }
+
+    /// The material of what became of a feature: its name, its colour, lit by nothing.
+    pub(super) fn of_mark(&mut self, asset: &mut Asset, mark: Mark) -> Index<Material> {
+        let [red, green, blue] = mark.colour().map(linear_from_srgb);
+        *self.by_mark.entry(mark).or_insert_with(|| {
+            let surface =
+                PbrMetallicRoughness { base_color_factor: PbrBaseColorFactor([red, green, blue, 1.0]), ..matt() };
+            asset.root.push(unlit(mark.name().to_owned(), surface))
+        })
     }
 
     /// The material of a label texture: an indexed PNG whose index is the class, never blended.

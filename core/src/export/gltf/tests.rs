@@ -1,11 +1,12 @@
 //! The documents read back with the `gltf` crate, and their bytes.
 
-use crate::export::{ExportError, ExportScene, glb, gltf};
+use crate::export::{ExportError, ExportScene, Mark, glb, gltf};
 use crate::image::{LabelImage, read_labels};
 use crate::mesh::{LabelTexture, Mesh, Object, Surface, Wrap};
 use proptest::prelude::*;
 use resurvey_schema::{ClassId, ClassTable, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Uncertainty};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 const STONE: Surface = Surface::Class(ClassId(0));
 const GLASS: Surface = Surface::Class(ClassId(1));
@@ -63,6 +64,7 @@ fn scene<'a>(classes: &'a ClassTable, objects: &'a [Object], descriptors: &'a [D
         classes,
         objects: (1..).zip(objects).collect(),
         descriptors: (17..).zip(descriptors).collect(),
+        marks: BTreeMap::new(),
     }
 }
 
@@ -359,4 +361,25 @@ fn a_mesh_that_contradicts_itself_is_refused_by_name() {
     let far = wall("far", GridPoint::new(1e9, 0.0, 0.0), &[STONE, GLASS]);
     let error = glb(&scene(&classes, &[good(), far], &[])).unwrap_err();
     assert!(matches!(error, ExportError::Position { .. }), "{error}");
+}
+
+#[test]
+fn a_difference_is_drawn_in_one_material_for_each_thing_that_became_of_a_feature() {
+    let (objects, descriptors) = street();
+    let classes = ClassTable::default();
+    let mut scene = scene(&classes, &objects, &descriptors);
+    // The textured wall went, the banner came, the bench moved; the other walls are as they were.
+    scene.marks = BTreeMap::from([(2, Mark::Removed), (17, Mark::Added), (18, Mark::Changed)]);
+    let (file, json, _) = export(&scene);
+    let material_of = |name: &str| {
+        let node = file.nodes().find(|node| node.name() == Some(name)).unwrap();
+        let names = node.mesh().unwrap().primitives().map(|one| one.material().name().unwrap().to_owned());
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!(material_of("W2"), ["removed", "removed"]);
+    assert_eq!((material_of("banner 17"), material_of("chair 18")), (vec!["added".into()], vec!["changed".into()]));
+    assert_eq!(material_of("W1"), ["stone", "glass"]);
+    let extras = json["nodes"].as_array().unwrap().iter().map(|node| &node["extras"]);
+    let marks: Vec<_> = extras.filter_map(|extras| extras["difference"].as_str()).collect();
+    assert_eq!(marks, ["removed", "added", "changed"]);
 }

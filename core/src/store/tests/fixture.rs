@@ -1,30 +1,82 @@
-//! The stored map of format 1 must open for ever.
+//! The stored maps of every format must open for ever.
 
 use super::fsck::eventful;
 use super::*;
-use crate::version::Digest;
+use crate::store::StoreError;
+use crate::version::{BoxMm, Digest};
 use std::path::PathBuf;
 
-fn fixture() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/map-format-1.rsv"))
+fn fixture(format: u32) -> PathBuf {
+    PathBuf::from(format!("{}/../tests/fixtures/map-format-{format}.rsv", env!("CARGO_MANIFEST_DIR")))
 }
 
-/// Never for a released format: `cargo test -p resurvey-core --lib -- --ignored make_the_map_of_format_1`.
+/// A copy of the stored map of this format.
+fn copy(format: u32) -> (TempDir, PathBuf) {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path().join("map.rsv");
+    std::fs::copy(fixture(format), &path).unwrap();
+    (directory, path)
+}
+
+/// Never for a released format: `cargo test -p resurvey-core --lib -- --ignored make_the_map_of_format_2`.
 #[test]
-#[ignore = "writes tests/fixtures/map-format-1.rsv"]
-fn make_the_map_of_format_1() {
+#[ignore = "writes tests/fixtures/map-format-2.rsv"]
+fn make_the_map_of_format_2() {
     let Scratch { directory, map } = eventful();
+    let mut update = transaction(4);
+    update.additions = vec![chair(30.0)];
+    update.viewed_region = Some(region());
+    update.observed_at = Some(at(6));
+    map.commit(&update, at(7)).unwrap();
+    map.gc(Some(VersionId(4)), at(8)).unwrap();
     let path = map.path().to_owned();
     drop(map);
-    std::fs::copy(path, fixture()).unwrap();
+    std::fs::copy(path, fixture(2)).unwrap();
     drop(directory);
+}
+
+/// What version 5 of the map of format 2 looked at.
+fn region() -> BoxMm {
+    BoxMm::of_plan(835_560.0, 817_840.0, 835_570.0, 817_850.0).unwrap()
+}
+
+#[test]
+fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
+    let (_directory, path) = copy(2);
+    let map = MapFile::open(&path).unwrap();
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 2));
+    let gone = StoreError::Forgotten { version: VersionId(3), next: VersionId(4) };
+    assert_eq!(map.snapshot(VersionId(3)).err(), Some(gone));
+    let chair_then = map.snapshot(VersionId(1)).unwrap().feature(Fid(2)).unwrap().state;
+    assert_eq!(chair_then, chair(100.0));
+    let snapshot = map.snapshot(VersionId(5)).unwrap();
+    assert_eq!(snapshot.feature(Fid(1)).unwrap().state, banner(0.5));
+    assert_eq!(snapshot.features_observed(at(6)).unwrap().len(), 4);
+    let mut stale = transaction(4);
+    stale.additions = vec![chair(31.0)];
+    let CommitError::Conflict { looked_at, .. } = map.commit(&stale, at(9)).unwrap_err() else { panic!() };
+    assert_eq!(looked_at, [VersionId(5)]);
+}
+
+#[test]
+fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() {
+    let (_directory, path) = copy(1);
+    let before = std::fs::read(&path).unwrap();
+    let reader = MapFile::open_read_only(&path).unwrap();
+    assert_eq!((reader.info().unwrap().format, reader.fsck()), (1, Ok(Vec::new())));
+    assert_eq!(reader.snapshot(VersionId(2)).unwrap().features().unwrap().len(), 4);
+    assert_eq!(reader.gc_plan(Some(VersionId(4))).unwrap().versions, [VersionId(2), VersionId(3)]);
+    drop(reader);
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+    let map = MapFile::open(&path).unwrap();
+    assert_eq!((map.info().unwrap().format, map.fsck()), (2, Ok(Vec::new())));
+    map.gc(Some(VersionId(4)), at(9)).unwrap();
+    assert_eq!(map.fsck(), Ok(Vec::new()));
 }
 
 #[test]
 fn the_map_of_format_1_opens_and_takes_another_version() {
-    let directory = TempDir::new().unwrap();
-    let path = directory.path().join("map.rsv");
-    std::fs::copy(fixture(), &path).unwrap();
+    let (_directory, path) = copy(1);
     let map = MapFile::open(&path).unwrap();
     assert_eq!(map.fsck(), Ok(Vec::new()));
     let snapshot = map.snapshot(VersionId(4)).unwrap();
@@ -43,9 +95,7 @@ fn the_map_of_format_1_opens_and_takes_another_version() {
 
 #[test]
 fn the_hashes_of_the_stored_map_are_those_that_another_program_computes() {
-    let directory = TempDir::new().unwrap();
-    let path = directory.path().join("map.rsv");
-    std::fs::copy(fixture(), &path).unwrap();
+    let (_directory, path) = copy(1);
     let map = MapFile::open_read_only(&path).unwrap();
     // python3 docs/verify_chain.py tests/fixtures/map-format-1.rsv
     for (version, hash) in HASHES.iter().enumerate() {

@@ -45,9 +45,15 @@ fn seen(capture: &[u8], labels: Option<&[u8]>) -> Observation {
     }
 }
 
-/// Runs `sql` without triggers, references and constraints, and returns what `fsck` then finds.
+/// What `fsck` finds after damage by `sql`.
 fn after_damage(sql: &str) -> Vec<String> {
     let scratch = eventful();
+    damage(&scratch, sql);
+    scratch.map.fsck().unwrap().iter().map(ToString::to_string).collect()
+}
+
+/// Runs `sql` without triggers, references and constraints.
+pub(super) fn damage(scratch: &Scratch, sql: &str) {
     let raw = Connection::open(scratch.map.path()).unwrap();
     raw.execute_batch("PRAGMA foreign_keys = OFF; PRAGMA ignore_check_constraints = ON").unwrap();
     let triggers: Vec<(String, String)> = raw
@@ -60,7 +66,6 @@ fn after_damage(sql: &str) -> Vec<String> {
     triggers.iter().for_each(|(name, _)| raw.execute_batch(&format!("DROP TRIGGER {name}")).unwrap());
     raw.execute_batch(sql).unwrap();
     triggers.iter().for_each(|(_, definition)| raw.execute_batch(definition).unwrap());
-    scratch.map.fsck().unwrap().iter().map(ToString::to_string).collect()
 }
 
 fn assert_found(sql: &str, expected: &str) {
@@ -139,6 +144,31 @@ const DAMAGE: &[(&str, &str)] = &[
     ("UPDATE observation SET labels = zeroblob(32)", "observations: observation 1: capture, labels or decision"),
     ("UPDATE label_image SET bytes = x'01'", "observations: label image"),
     ("UPDATE proposal SET operations = x'01'", "proposals: proposal 1: operations: at byte 0"),
+    (
+        "UPDATE proposal SET status = 'accepted', decided_at = 1, version = 99",
+        "references: proposal 1: refers to a row",
+    ),
+    // Forgotten versions.
+    (
+        "INSERT INTO forgotten VALUES (2, 0, zeroblob(32), 9, 0)",
+        "forgotten: version 3: follows a forgotten version and does not say so",
+    ),
+    (
+        "INSERT INTO forgotten VALUES (2, 1, zeroblob(32), 9, 0)",
+        "forgotten: version 2: is cut off from version 1, which is",
+    ),
+    ("INSERT INTO forgotten VALUES (2, 1, zeroblob(32), 9, 0)", "versions: version 2: has hash"),
+    ("INSERT INTO forgotten VALUES (4, 0, zeroblob(32), 9, 0)", "forgotten: version 4: is the newest and forgotten"),
+    (
+        "INSERT INTO forgotten VALUES (1, 0, zeroblob(32), 9, 0)",
+        "forgotten: tag \"surveyed\": names version 1, which is",
+    ),
+    (
+        "INSERT INTO forgotten VALUES (1, 0, zeroblob(32), 9, 0), (2, 0, zeroblob(32), 9, 0)",
+        "forgotten: feature 2 from version 1: is in no version that is kept",
+    ),
+    ("INSERT INTO looked_at VALUES (9, 0, 0, 0, 0, 0, 0)", "references: looked_at 9: refers to a row of version"),
+    ("DROP INDEX observation_digest", "schema: index observation_digest: is missing"),
     // Names and the file itself.
     ("UPDATE tag SET name = 'head'", "tags: tag \"head\""),
     ("UPDATE tag SET version = 77", "references: tag: refers to a row of version"),

@@ -12,13 +12,13 @@ use std::collections::BTreeMap;
 
 /// What a random history does next.
 #[derive(Clone, Debug)]
-enum Step {
+pub(super) enum Step {
     Add(f64),
     Move(usize, f64),
     Remove(usize),
 }
 
-fn steps() -> impl Strategy<Value = Vec<Vec<Step>>> {
+pub(super) fn steps() -> impl Strategy<Value = Vec<Vec<Step>>> {
     let step = prop_oneof![
         (-50.0..50.0_f64).prop_map(Step::Add),
         (any::<usize>(), -50.0..50.0_f64).prop_map(|(which, offset)| Step::Move(which, offset)),
@@ -27,10 +27,10 @@ fn steps() -> impl Strategy<Value = Vec<Vec<Step>>> {
     proptest::collection::vec(proptest::collection::vec(step, 1..5), 1..8)
 }
 
-type Content = BTreeMap<Fid, FeatureState>;
+pub(super) type Content = BTreeMap<Fid, FeatureState>;
 
 /// Commits `history` and returns what each version should hold, kept beside the store.
-fn play(scratch: &Scratch, history: &[Vec<Step>]) -> Vec<Content> {
+pub(super) fn play(scratch: &Scratch, history: &[Vec<Step>]) -> Vec<Content> {
     let mut contents = vec![Content::new()];
     let mut next = 1;
     for steps in history {
@@ -68,7 +68,7 @@ fn play(scratch: &Scratch, history: &[Vec<Step>]) -> Vec<Content> {
     contents
 }
 
-fn content(scratch: &Scratch, version: usize) -> Content {
+pub(super) fn content(scratch: &Scratch, version: usize) -> Content {
     let features = scratch.map.snapshot(VersionId(version as u64)).unwrap().features().unwrap();
     features.into_iter().map(|feature| (feature.fid, feature.state)).collect()
 }
@@ -191,7 +191,7 @@ fn the_log_of_a_feature_is_newest_first_and_says_what_happened_to_it_alone() {
     assert_eq!(all, [2, 1, 0]);
 }
 
-fn observation(decision: Decision) -> Observation {
+pub(super) fn observation(decision: Decision) -> Observation {
     let pose = Pose {
         position: GridPoint::new(835_601.930_59, 817_797.110_28, 6.1),
         yaw_rad: 4.9,

@@ -2,10 +2,15 @@
 
 mod commit;
 mod fixture;
+mod forget;
 mod fsck;
 mod history;
 mod measure;
+mod observed;
 mod open;
+mod repair;
+mod review;
+mod undo;
 
 use super::{CommitError, MapFile, NewMap};
 use crate::version::{FeatureState, Fid, Frame, UpdateTransaction, VersionId, VersionKind};

@@ -1,0 +1,181 @@
+//! Undoing versions.
+
+use super::history::{content, play, steps};
+use super::*;
+use crate::store::{ConflictingChange, Revert, StoreError};
+use crate::version::{BoxMm, Counts, Delta, Digest, VersionKind};
+use proptest::prelude::*;
+
+fn wish(version: u64, region: Option<BoxMm>) -> Revert {
+    Revert { version: VersionId(version), region, author: "ada".to_owned(), message: None, idempotency_key: None }
+}
+
+fn undo(scratch: &Scratch, version: u64) -> Result<VersionId, CommitError> {
+    scratch.map.revert(&wish(version, None), at(50))
+}
+
+/// Around what stands `offset` m north of the banner's corner.
+fn around(offset: f64) -> Option<BoxMm> {
+    let n = 817_816.210_8 + offset;
+    Some(BoxMm::of_plan(835_560.0, n - 1.0, 835_575.0, n + 1.0).unwrap())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_newest_version_undone_is_the_one_before_and_that_undone_is_the_original(history in steps()) {
+        let scratch = Scratch::new();
+        let contents = play(&scratch, &history);
+        let head = contents.len() - 1;
+        prop_assume!(head > 0);
+        prop_assert_eq!(undo(&scratch, head as u64), Ok(VersionId(head as u64 + 1)));
+        prop_assert_eq!(&content(&scratch, head + 1), &contents[head - 1]);
+        prop_assert_eq!(undo(&scratch, head as u64 + 1), Ok(VersionId(head as u64 + 2)));
+        prop_assert_eq!(&content(&scratch, head + 2), &contents[head]);
+        prop_assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn all_versions_undone_from_the_newest_on_leave_the_empty_map(history in steps()) {
+        let scratch = Scratch::new();
+        let contents = play(&scratch, &history);
+        let head = contents.len() - 1;
+        for version in (1..=head).rev() {
+            undo(&scratch, version as u64).unwrap();
+            let now = scratch.map.head().unwrap();
+            prop_assert_eq!(&content(&scratch, now.0 as usize), &contents[version - 1]);
+        }
+    }
+
+    #[test]
+    fn an_undo_either_restores_every_feature_of_the_version_or_names_who_changed_them(
+        history in steps(), which in any::<usize>(),
+    ) {
+        let scratch = Scratch::new();
+        let contents = play(&scratch, &history);
+        let head = contents.len() - 1;
+        prop_assume!(head > 0);
+        let version = VersionId(1 + (which % head) as u64);
+        let did = scratch.map.changes_of(version).unwrap();
+        match undo(&scratch, version.0) {
+            Ok(made) => {
+                let now = content(&scratch, made.0 as usize);
+                for delta in &did {
+                    prop_assert_eq!(now.get(&delta.fid()), delta.before());
+                }
+            }
+            Err(CommitError::Conflict { changed, .. }) => {
+                for ConflictingChange { fid, changed_in, .. } in changed {
+                    prop_assert!(did.iter().any(|delta| delta.fid() == fid) && changed_in.unwrap() > version);
+                }
+                prop_assert_eq!(scratch.map.head(), Ok(VersionId(head as u64)));
+            }
+            other => prop_assert!(false, "{:?}", other),
+        }
+        prop_assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+    }
+}
+
+#[test]
+fn an_undo_says_what_it_undoes_and_speaks_of_the_same_time() {
+    let scratch = Scratch::with_two_features();
+    let mut update = transaction(1);
+    update.deltas = vec![Delta::modify(Fid(1), banner(0.0), banner(1.0))];
+    update.observed_at = Some(at(-100));
+    scratch.map.commit(&update, at(2)).unwrap();
+    assert_eq!(undo(&scratch, 2), Ok(VersionId(3)));
+    let record = scratch.map.version(VersionId(3)).unwrap();
+    assert_eq!(
+        (record.kind, record.reverts, record.observed_at),
+        (VersionKind::Revert, Some(VersionId(2)), Some(at(-100)))
+    );
+    assert_eq!((record.author.as_str(), record.message.as_str()), ("ada", "revert version 2: a test"));
+    assert_eq!(scratch.live(1), banner(0.0));
+}
+
+#[test]
+fn an_undo_of_what_later_versions_changed_is_refused_with_each_of_them() {
+    let scratch = Scratch::with_two_features();
+    let mut both = transaction(1);
+    both.deltas =
+        vec![Delta::modify(Fid(1), banner(0.0), banner(1.0)), Delta::modify(Fid(2), chair(100.0), chair(101.0))];
+    scratch.map.commit(&both, at(2)).unwrap();
+    let mut later = transaction(2);
+    later.deltas = vec![Delta::modify(Fid(2), chair(101.0), chair(102.0))];
+    scratch.map.commit(&later, at(3)).unwrap();
+    let Err(CommitError::Conflict { base, head, changed, .. }) = undo(&scratch, 2) else { panic!() };
+    let found = Some(chair(102.0));
+    let expected = ConflictingChange { fid: Fid(2), changed_in: Some(VersionId(3)), found, is_target: true };
+    assert_eq!((base, head, changed), (VersionId(2), VersionId(3), vec![expected]));
+    // Twice the same is a conflict too.
+    assert_eq!(undo(&scratch, 3), Ok(VersionId(4)));
+    assert!(matches!(undo(&scratch, 3), Err(CommitError::Conflict { .. })));
+    assert_eq!(undo(&scratch, 2), Ok(VersionId(5)));
+    assert_eq!((scratch.live(1), scratch.live(2)), (banner(0.0), chair(100.0)));
+}
+
+#[test]
+fn an_undo_of_a_region_leaves_the_rest() {
+    let scratch = Scratch::with_two_features();
+    let both = |scratch: &Scratch| (scratch.live(1), scratch.live(2));
+    let mut update = transaction(1);
+    update.deltas =
+        vec![Delta::modify(Fid(1), banner(0.0), banner(1.0)), Delta::modify(Fid(2), chair(100.0), chair(110.0))];
+    scratch.map.commit(&update, at(2)).unwrap();
+    // The chair left this region, so it is undone from its old place as well as from its new one.
+    assert_eq!(scratch.map.revert(&wish(2, around(100.0)), at(3)), Ok(VersionId(3)));
+    assert_eq!(both(&scratch), (banner(1.0), chair(100.0)));
+    let counts = scratch.map.version(VersionId(3)).unwrap().counts;
+    assert_eq!(counts, Counts { added: 0, modified: 1, removed: 0 });
+    let nothing = CommitError::NothingToRevert { version: VersionId(2), place: " in the region" };
+    assert_eq!(scratch.map.revert(&wish(2, around(500.0)), at(4)), Err(nothing));
+    assert_eq!(undo(&scratch, 3), Ok(VersionId(4)));
+    assert_eq!(both(&scratch), (banner(1.0), chair(110.0)));
+}
+
+#[test]
+fn an_import_is_undone_and_done_again_with_its_geometry() {
+    let scratch = Scratch::new();
+    let bounds = BoxMm::from_mm([0; 3], [1000; 3]).unwrap();
+    let mut import = transaction(0);
+    let geometry = import.add_geometry(b"a mesh".to_vec());
+    import.additions = vec![FeatureState::Object { name: "tower".to_owned(), geometry, bounds }];
+    scratch.map.commit(&import, at(1)).unwrap();
+    assert_eq!(undo(&scratch, 1), Ok(VersionId(2)));
+    assert_eq!(undo(&scratch, 2), Ok(VersionId(3)));
+    assert_eq!(scratch.live(1), import.additions[0]);
+    assert_eq!(scratch.map.geometry(Digest::of(b"a mesh")), Ok(b"a mesh".to_vec()));
+}
+
+#[test]
+fn a_class_table_is_undone_while_it_is_in_force() {
+    let scratch = Scratch::with_two_features();
+    let mut classes: Vec<_> = ClassTable::default().iter().cloned().collect();
+    classes[8].name = "ground".to_owned();
+    let mut rename = transaction(1);
+    rename.classes = Some(ClassTable::new(classes).unwrap());
+    scratch.map.commit(&rename, at(2)).unwrap();
+    assert_eq!(undo(&scratch, 2), Ok(VersionId(3)));
+    let name = |version| scratch.map.snapshot(VersionId(version)).unwrap().classes().name(ClassId(8)).to_owned();
+    assert_eq!((name(2).as_str(), name(3).as_str()), ("ground", "others"));
+    assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+}
+
+#[test]
+fn what_cannot_be_undone_is_refused_by_name() {
+    let scratch = Scratch::with_two_features();
+    assert_eq!(undo(&scratch, 0), Err(CommitError::NothingToRevert { version: VersionId(0), place: "" }));
+    let missing = StoreError::NoSuchVersion { version: VersionId(9), head: VersionId(1) };
+    assert_eq!(undo(&scratch, 9), Err(CommitError::Store(missing)));
+}
+
+#[test]
+fn an_undo_that_is_sent_twice_is_done_once() {
+    let scratch = Scratch::with_two_features();
+    let keyed = Revert { idempotency_key: Some("undo 1".to_owned()), ..wish(1, None) };
+    assert_eq!(scratch.map.revert(&keyed, at(2)), Ok(VersionId(2)));
+    assert_eq!(scratch.map.revert(&keyed, at(3)), Ok(VersionId(2)));
+    assert_eq!(scratch.map.made_with("undo 1"), Ok(Some(VersionId(2))));
+    assert_eq!(scratch.map.head(), Ok(VersionId(2)));
+}
