@@ -4,6 +4,7 @@ use crate::args::Apply;
 use crate::console::Console;
 use crate::failure::Failure;
 use jiff::Timestamp;
+use resurvey_core::mesh::decode_mesh;
 use resurvey_core::store::MapFile;
 use resurvey_core::version::read_change_set;
 use serde_json::json;
@@ -18,6 +19,9 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
     let text = read(&options.file).map_err(|error| Failure::input(format!("{place}: {error}")))?;
     let changes = read_change_set(&text, map.snapshot(head)?.classes())
         .map_err(|error| Failure::input(format!("{place}: {error}")))?;
+    for (digest, bytes) in &changes.geometries {
+        decode_mesh(bytes).map_err(|error| Failure::input(format!("{place}: geometry {digest}: {error}")))?;
+    }
     let mut transaction = changes.into_transaction(head);
     transaction.idempotency_key.clone_from(&options.retry.idempotency_key);
     let committed = map.commit(&transaction, Timestamp::now());

@@ -6,6 +6,8 @@ use crate::failure::Failure;
 use resurvey_core::store::MapFile;
 use resurvey_core::version::{VersionId, write_change_set};
 use resurvey_schema::changes::{ChangeSetHeader, FORMAT};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Prints what leads from one version to another as a change set.
 pub fn run(options: &Changes, console: &mut Console<'_>) -> Result<u8, Failure> {
@@ -14,16 +16,14 @@ pub fn run(options: &Changes, console: &mut Console<'_>) -> Result<u8, Failure> 
     let deltas = map.changes(from, to)?;
     let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
     let header = header(&map, from, to)?;
-    let (text, left_out) = write_change_set(&header, &deltas, (before.classes(), after.classes()))?;
-    console.out().write_all(text.as_bytes())?;
-    if !left_out.is_empty() {
-        let names: Vec<String> = left_out.iter().map(ToString::to_string).collect();
-        console.message(&format!(
-            "warning: {} objects differ too ({}); a change set carries descriptors only, so import them there as well",
-            names.len(),
-            names.join(", ")
-        ));
+    let mut geometries = BTreeMap::new();
+    for digest in deltas.iter().filter_map(|delta| delta.after()?.geometry()) {
+        if let Entry::Vacant(place) = geometries.entry(digest) {
+            place.insert(map.geometry(digest)?);
+        }
     }
+    let text = write_change_set(&header, &deltas, (before.classes(), after.classes()), &geometries)?;
+    console.out().write_all(text.as_bytes())?;
     if before.classes() != after.classes() {
         console.message("warning: the class table differs too; a change set does not carry it");
     }

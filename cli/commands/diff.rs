@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::region;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::MapFile;
-use resurvey_core::version::{Delta, FeatureState};
+use resurvey_core::version::{Delta, FeatureState, Fid};
 use resurvey_schema::{ClassTable, Descriptor};
 use serde_json::{Value, json};
 
@@ -64,7 +64,8 @@ impl Sides<'_> {
 
     /// `++` and `--` for what came and went, `-` and `+` for every value that changed.
     pub(super) fn text(&self, delta: &Delta, console: &mut Console<'_>) -> Result<(), Failure> {
-        let fid = delta.fid();
+        // Number 0 stands for one that the map has not given yet.
+        let fid = if delta.fid() == Fid(0) { "new".to_owned() } else { delta.fid().to_string() };
         match (delta.before(), delta.after()) {
             (None, Some(after)) => console.line(format_args!("++ {fid} {}", words(after, self.after)))?,
             (Some(before), None) => console.line(format_args!("-- {fid} {}", words(before, self.before)))?,

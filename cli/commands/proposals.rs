@@ -82,7 +82,6 @@ fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure
     }
     let sides = Sides { before: classes, after: classes };
     for delta in deltas(&proposal) {
-        // Fid 0 stands for a number that the map has not given yet.
         sides.text(&delta, console)?;
     }
     match &observation {

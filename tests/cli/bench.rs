@@ -178,6 +178,23 @@ impl Bench {
         assert!(self.is_unchanged(), "{command} {arguments:?} changed the map");
     }
 
+    /// The features of a version without the versions they are from.
+    pub fn state(&self, revision: &str) -> Vec<Value> {
+        let answer = self.json("query", &["--at", revision]);
+        let without = |feature: &Value| {
+            let mut fields = feature.as_object().unwrap().clone();
+            fields.retain(|key, _| key != "from" && key != "to");
+            Value::Object(fields)
+        };
+        answer["features"].as_array().unwrap().iter().map(without).collect()
+    }
+
+    /// Applies operations to head, and returns the new version.
+    pub fn apply(&self, lines: &[Value]) -> u64 {
+        let file = self.file("lines.jsonl", crate::change_sets::set(None, lines));
+        self.json("apply", &[&file])["version"].as_u64().unwrap()
+    }
+
     /// Whether the map file has the bytes it began with and nothing waits to be written into it.
     pub fn is_unchanged(&self) -> bool {
         let log = std::fs::metadata(self.path("map.rsv-wal")).map_or(0, |file| file.len());

@@ -4,25 +4,27 @@ use crate::bench::{Bench, edited};
 use serde_json::{Value, json};
 
 /// A point of the street, 30 m from its origin.
-const CHAIR: [f64; 3] = [835_600.0, 817_800.0, 4.5];
+pub const CHAIR: [f64; 3] = [835_600.0, 817_800.0, 4.5];
 
-fn chair() -> Value {
+/// A chair at [`CHAIR`].
+pub fn chair() -> Value {
     json!({"class": "chair", "position": CHAIR})
 }
 
 /// 2 m × 1 m, facing east.
-fn banner() -> Value {
+pub fn banner() -> Value {
     let [e, n, h] = CHAIR;
     json!({"class": "banner", "corners": [[e, n, h], [e, n + 2.0, h], [e, n + 2.0, h + 1.0], [e, n, h + 1.0]]})
 }
 
-fn set(base: Option<u64>, lines: &[Value]) -> String {
+/// A change set as text.
+pub fn set(base: Option<u64>, lines: &[Value]) -> String {
     let header = json!({"format": "resurvey.changes/1", "base_version": base, "author": "survey", "message": "m"});
     std::iter::once(&header).chain(lines).map(|line| format!("{line}\n")).collect()
 }
 
 /// A map with a chair (fid 1) and a banner (fid 2) as version 1.
-fn furnished() -> Bench {
+pub fn furnished() -> Bench {
     let bench = Bench::with_empty_map();
     let lines = [json!({"op": "add", "after": chair()}), json!({"op": "add", "after": banner()})];
     let file = bench.file("first.jsonl", set(Some(0), &lines));

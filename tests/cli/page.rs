@@ -84,6 +84,10 @@ fn the_page_names_every_key_of_every_document() {
         bench.json("log", &[]),
         bench.json("why", &[&fid]),
         bench.json("fsck", &[]),
+        bench.json("fsck", &["--repair"]),
+        bench.json("gc", &[]),
+        bench.json("diff", &["1..2"]),
+        bench.json("export", &["--diff", "1..2", text(&out)]),
         bench.run("localize", &[text(&capture), "--set", "semantic.radius_m=2", "--json"]).json(),
         bench.json("render", &["--pose", text(&pose), "--out", text(&view)]),
         bench.json("export", &[text(&out)]),
@@ -98,7 +102,20 @@ fn the_page_names_every_key_of_every_document() {
             .ok()
             .json(),
     ];
+    let reviewed = Bench::with_street();
+    let proposed = [text(&capture), "--pose", text(&pose), "--propose"];
+    let reviews = [
+        reviewed.json("update", &proposed),
+        reviewed.json("proposals", &["show", "1"]),
+        reviewed.json("proposals", &["accept", "1"]),
+        reviewed.json("proposals", &["list", "--all"]),
+        reviewed.json("tag", &["surveyed"]),
+        reviewed.json("tag", &[]),
+        reviewed.json("revert", &["head"]),
+        reviewed.run("revert", &["2", "--json"]).json(),
+    ];
     let mut found = BTreeSet::new();
+    reviews.iter().for_each(|document| keys(document, &mut found));
     documents.iter().for_each(|document| keys(document, &mut found));
     assert!(found.len() > 80, "{found:?}");
     // Code or a quoted key.
@@ -108,9 +125,26 @@ fn the_page_names_every_key_of_every_document() {
 
 #[test]
 fn the_help_of_every_command_says_what_changes() {
-    for command in
-        ["init", "import", "localize", "render", "update", "query", "log", "why", "apply", "export", "eval", "fsck"]
-    {
+    for command in [
+        "init",
+        "import",
+        "localize",
+        "render",
+        "update",
+        "query",
+        "log",
+        "diff",
+        "revert",
+        "tag",
+        "why",
+        "proposals",
+        "changes",
+        "apply",
+        "export",
+        "eval",
+        "fsck",
+        "gc",
+    ] {
         let help = resurvey(&[command, "--help"]).ok().out;
         let first = help.lines().next().unwrap();
         let words = ["changes", "new version", "map file", "writes"];
