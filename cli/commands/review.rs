@@ -6,7 +6,7 @@ use super::update::{Committed, Outcome, Run, message_of};
 use crate::failure::Failure;
 use jiff::Timestamp;
 use resurvey_core::capture::Capture;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{MapFile, StoreError};
 use resurvey_core::update::{Change, Confirmation, add_changes, confirm, testimonies};
 use resurvey_core::version::{Decision, Digest, Observation, UpdateTransaction, VersionId, VersionKind};
 use serde_json::{Value, json};
@@ -101,9 +101,13 @@ impl Run<'_> {
 pub(super) fn repeated(map: &MapFile, key: Option<&str>, path: &Path) -> Result<Option<Value>, Failure> {
     let Some(version) = key.map_or(Ok(None), |key| map.made_with(key))? else { return Ok(None) };
     let record = map.version(version)?;
-    let snapshot = map.snapshot(version)?;
+    let snapshot = map.snapshot(map.head()?)?;
     let sides = Sides { before: snapshot.classes(), after: snapshot.classes() };
-    let changes = map.changes_of(version)?;
+    let changes = match map.changes_of(version) {
+        // It was committed, and that is the answer.
+        Err(StoreError::Forgotten { .. }) => Vec::new(),
+        known => known?,
+    };
     let changes = changes.iter().map(|delta| sides.document(delta)).collect::<Result<Vec<_>, _>>()?;
     Ok(Some(json!({
         "capture": path.display().to_string(),

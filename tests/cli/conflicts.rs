@@ -124,6 +124,9 @@ fn an_update_that_is_sent_again_with_its_key_gives_its_first_version() {
     assert_eq!(again["changes"][0]["fid"], first["changes"][0]["fid"]);
     assert!(bench.run("update", &words).ok().out.contains("committed before, version 2"));
     assert_eq!(bench.head(), 3);
+    bench.run("gc", &["--forget-before", "head"]).ok();
+    let forgotten = bench.json("update", &words);
+    assert_eq!((&forgotten["version"], &forgotten["changes"]), (&json!(2), &json!([])));
     let two = [text(&capture), text(&capture), "--idempotency-key", "k"];
     bench.run("update", &two).refused(2, &["--idempotency-key belongs to one photo"]);
 }

@@ -1,6 +1,7 @@
 //! Tests of the store through its public door, and the maps they start from.
 
 mod commit;
+mod exchange;
 mod fixture;
 mod forget;
 mod fsck;
