@@ -14,7 +14,7 @@ const POSITIONS_PER_EXACT_CALL: usize = 16;
 /// The largest radius, metres: maps are loaded about this far around the prior.
 const LARGEST_M: f64 = 400.0;
 /// Candidates that are scored again on full views where the grid is the answer.
-const BEST_OF_GRID: usize = 150;
+const BEST_OF_GRID: usize = 100;
 /// One column a degree: headings are whole columns.
 const COLUMNS: u32 = 360;
 
@@ -83,6 +83,36 @@ impl Sweep<'_, '_> {
         let Settings { radius_m, widen, .. } = *self.settings;
         let sigma_m = self.photo.prior.position_sigma_m;
         if widen && sigma_m > UNSURE[0] { radius_m.max(SIGMAS * sigma_m).min(LARGEST_M) } else { radius_m }
+    }
+
+    /// The candidates next to `pose` on the grid: a step of position, of heading, or of both.
+    pub fn neighbours(&self, pose: &Pose) -> Result<Vec<Pose>, Error> {
+        let (spacing_m, centre) = (self.settings.spacing_m, self.photo.prior.pose);
+        let step_rad = f64::from(self.settings.yaw_step_deg).to_radians();
+        let request = self.request();
+        let last_rad = request.first_yaw_rad + step_rad * f64::from(request.yaw_count - 1);
+        let mut neighbours = Vec::new();
+        for (east, north) in (-1..=1).flat_map(|east| (-1..=1).map(move |north| (f64::from(east), f64::from(north)))) {
+            let GridPoint { easting_m, northing_m, height_m } = pose.position;
+            let position = GridPoint::new(easting_m + east * spacing_m, northing_m + north * spacing_m, height_m);
+            if position.plan_distance_m(&centre.position) > self.radius_m() + 1e-6 {
+                continue;
+            }
+            for turn in [-1.0, 0.0, 1.0] {
+                let yaw_rad = pose.yaw_rad + turn * step_rad;
+                let is_in_range = (request.first_yaw_rad - 1e-9..=last_rad + 1e-9).contains(&yaw_rad);
+                let is_itself = east.abs() + north.abs() + f64::abs(turn) < 0.5;
+                if is_in_range && !is_itself {
+                    neighbours.push(Pose { position, yaw_rad, ..*pose });
+                }
+            }
+        }
+        if self.settings.skip_inside {
+            let positions: Vec<GridPoint> = neighbours.iter().map(|pose| pose.position).collect();
+            let mut inside = self.host.inside_solid(&positions)?.into_iter();
+            neighbours.retain(|_| !inside.next().unwrap_or(false));
+        }
+        Ok(neighbours)
     }
 
     fn yaw_range_deg(&self) -> f64 {

@@ -63,7 +63,7 @@ impl Searcher for Semantic {
             let spread = aligned.map(|covariance| Ok(doubt::with_floor(covariance)));
             (best, spread.unwrap_or_else(|| objective.covariance(&best))?)
         } else {
-            let best = objective.rescore(&mut modes)?;
+            let best = objective.rescore(&mut modes, &sweep)?;
             (best, objective.covariance(&best)?)
         };
         Ok(Localization {

@@ -1,5 +1,6 @@
 //! Finer than the grid: a compass search over position, heading, pitch, roll and height on perspective views.
 
+use crate::candidates::Sweep;
 use crate::doubt;
 use crate::likeness::{Compared, Likeness};
 use crate::mode::{Mode, log_prior};
@@ -48,6 +49,9 @@ const PIVOTS_M: [f64; 2] = [8.0, 30.0];
 /// Steps of one mode at one level; a search that needs more is climbing noise.
 const MAX_ROUNDS: usize = 60;
 
+/// Candidates of the grid that climb to their neighbours.
+const CLIMBERS: usize = 4;
+
 /// A move in the camera's own axes: right, forward, up in metres; yaw, pitch, roll in radians.
 pub type Move = [f64; 6];
 
@@ -68,12 +72,23 @@ impl Objective<'_, '_> {
         Ok(())
     }
 
-    /// Scores `modes` as they stand on views of the photo's full size and sorts them best first.
-    pub fn rescore(&self, modes: &mut [Mode]) -> Result<Mode, Error> {
+    /// Scores `modes` as they stand on views of the photo's full size, lets the best of them climb over the candidates
+    /// next to them, sorts all best first, and returns the first.
+    pub fn rescore(&self, modes: &mut [Mode], sweep: &Sweep<'_, '_>) -> Result<Mode, Error> {
         let poses: Vec<Pose> = modes.iter().map(|mode| mode.pose).collect();
-        let scored = self.evaluate(1, &poses)?;
-        modes.copy_from_slice(&scored);
-        modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+        modes.copy_from_slice(&self.evaluate(1, &poses)?);
+        let best_first = |a: &Mode, b: &Mode| b.log_posterior.total_cmp(&a.log_posterior);
+        modes.sort_by(best_first);
+        for mode in modes.iter_mut().take(CLIMBERS) {
+            for _ in 0..MAX_ROUNDS {
+                let neighbours = self.evaluate(1, &sweep.neighbours(&mode.pose)?)?;
+                match neighbours.iter().min_by(|a, b| best_first(a, b)) {
+                    Some(better) if better.log_posterior > mode.log_posterior => *mode = *better,
+                    _ => break,
+                }
+            }
+        }
+        modes.sort_by(best_first);
         Ok(modes[0])
     }
 
