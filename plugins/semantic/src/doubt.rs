@@ -53,6 +53,14 @@ pub fn with_floor(mut covariance: Covariance) -> Covariance {
     covariance
 }
 
+/// `covariance` of an answer that no search around it bounds: at least 5 m, or the radius searched.
+pub fn unbounded(mut covariance: Covariance, searched_m: f64) -> Covariance {
+    let unsure_m2 = searched_m.max(SAME_PLACE_M).powi(2);
+    covariance[0][0] += unsure_m2;
+    covariance[1][1] += unsure_m2;
+    covariance
+}
+
 /// The best mode more than 5 m from the first; `modes` are sorted best first.
 pub fn runner_up(modes: &[Mode], settings: &Settings) -> Option<RunnerUp> {
     let best = modes.first()?;
@@ -147,6 +155,12 @@ mod tests {
             let ratio = found[axis][axis].sqrt() / sigma[axis];
             assert!((0.7..1.3).contains(&ratio), "axis {axis}: found over true 1 sigma is {ratio:.2}");
         }
+    }
+
+    #[test]
+    fn an_answer_outside_the_search_is_at_least_five_metres_unsure() {
+        let widened = unbounded([[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 1e-4]], 2.0);
+        assert!(widened[0][0].sqrt() >= 5.0 && widened[1][1].sqrt() >= 5.0 && widened[2][2] < 2e-4);
     }
 
     #[test]

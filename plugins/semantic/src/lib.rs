@@ -66,6 +66,13 @@ impl Searcher for Semantic {
             let best = objective.rescore(&mut modes, &sweep)?;
             (best, objective.covariance(&best)?)
         };
+        let searched_m = sweep.radius_m().max(settings.spacing_m);
+        let covariance = if best.pose.position.plan_distance_m(&photo.prior.pose.position) > searched_m {
+            // It climbed out of the searched circle: what else lies outside was never compared.
+            doubt::unbounded(covariance, searched_m)
+        } else {
+            covariance
+        };
         Ok(Localization {
             pose: best.pose,
             score: best.score.clamp(0.0, 1.0),
