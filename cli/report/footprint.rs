@@ -1,6 +1,6 @@
 //! Buildings in plan: the map cut at one height.
 
-use resurvey_core::render::Scene;
+use resurvey_core::render::{Scene, horizontal_cut};
 
 /// A line in plan: easting and northing of both ends, metres.
 pub type Line = [[f64; 2]; 2];
@@ -15,29 +15,13 @@ pub fn footprints(scene: &Scene, height_m: f64, [low, high]: [[f64; 2]; 2]) -> V
             .all(|axis| line[0][axis].min(line[1][axis]) <= high[axis] && line[0][axis].max(line[1][axis]) >= low[axis])
     };
     let triangles = scene.objects().iter().flat_map(|object| &scene.positions()[object.triangles.clone()]);
-    let cuts = triangles.filter_map(|triangle| cut(&triangle.map(|corner| corner.map(f64::from)), cut_m));
+    let cuts = triangles.filter_map(|triangle| horizontal_cut(triangle, cut_m));
     cuts.map(|line| line.map(|end| [0, 1].map(|axis| end[axis] + start[axis]))).filter(is_near).collect()
-}
-
-/// The line in which a triangle crosses the height; half-open, so that a corner on it counts once.
-fn cut(corners: &[[f64; 3]; 3], cut_m: f64) -> Option<Line> {
-    let mut ends = [[0.0; 2]; 2];
-    let mut count = 0;
-    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-        let (low, high) = if corners[from][2] <= corners[to][2] { (from, to) } else { (to, from) };
-        let (low, high) = (corners[low], corners[high]);
-        if low[2] <= cut_m && high[2] > cut_m {
-            let share = (cut_m - low[2]) / (high[2] - low[2]);
-            ends[count.min(1)] = [0, 1].map(|axis| low[axis] + share * (high[axis] - low[axis]));
-            count += 1;
-        }
-    }
-    (count == 2).then_some(ends)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::cut;
+    use super::horizontal_cut as cut;
 
     #[test]
     fn a_wall_is_a_line_and_the_floor_is_none() {

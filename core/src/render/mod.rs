@@ -30,6 +30,6 @@ pub use hierarchy::{Bounds, Hierarchy};
 pub use raster::Renderer;
 pub use rays::{Hit, Nearest, RayCaster};
 pub use scene::{Cluster, Scene, SceneObject};
-pub use solid::{SolidMask, inside_solid};
+pub use solid::{SolidMask, horizontal_cut, inside_solid};
 pub use texture::texel_class;
 pub use view::{View, view};

@@ -107,10 +107,11 @@ impl Footprint {
 
 /// Where triangles cross the height.
 fn slice(scene: &Scene, triangles: std::ops::Range<usize>, cut_m: f64) -> Vec<Segment> {
-    scene.positions()[triangles].iter().filter_map(|triangle| cut(triangle, cut_m)).collect()
+    scene.positions()[triangles].iter().filter_map(|triangle| horizontal_cut(triangle, cut_m)).collect()
 }
 
-fn cut(triangle: &[[f32; 3]; 3], cut_m: f64) -> Option<Segment> {
+/// The line in plan in which a triangle (E, N, H) crosses a height; `None` where it does not.
+pub fn horizontal_cut(triangle: &[[f32; 3]; 3], cut_m: f64) -> Option<[[f64; 2]; 2]> {
     let corners = triangle.map(|corner| corner.map(f64::from));
     let mut ends = [[0.0; 2]; 2];
     let mut count = 0;
