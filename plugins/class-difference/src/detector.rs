@@ -7,6 +7,7 @@ use crate::region::{Growth, grow, most_frequent, region, sound_components};
 use crate::removal::{Evidence, Seen, seen};
 use crate::settings::{Profile, SCHEMA, Settings};
 use crate::tolerance::Tolerance;
+use crate::uncovered::is_uncovered;
 use resurvey_plugin::schema::{ChangeRegion, ClassId, ClassKind, ClassTable};
 use resurvey_plugin::{Comparison, Detector, Error, Host, Plugin};
 
@@ -64,15 +65,26 @@ impl ClassDifference {
         let grown = grow(rasters, &tolerance_px, &growth);
         let limit_px = |class: u8| self.limit_px(classes, class, rasters.photo.len());
         let added = sound_components(&grown, &changed, rasters.width, settings.min_radius_px, limit_px);
-        let added = added
-            .iter()
-            .map(|pixels| region(rasters, pixels, ClassId(rasters.photo[pixels[0]]), settings.max_hole_share));
+        let mut new = Vec::new();
+        for pixels in added {
+            let class = ClassId(rasters.photo[pixels[0]]);
+            let is_material = classes.kind(class) == ClassKind::Material;
+            if is_material {
+                let sure: Vec<usize> = pixels.iter().copied().filter(|pixel| changed[*pixel]).collect();
+                let own = pixels.iter().filter(|pixel| !same_descriptor[**pixel]).count();
+                let share = sure.len() as f64 / own.max(1) as f64;
+                let unc = is_uncovered(host, comparison, rasters, &tolerance, &sure, class)?;
+                if std::env::var("DBG").is_ok() { eprintln!("REGION {class:?} px {} sure {share:.2} uncovered {unc}", pixels.len()); }
+                if share < settings.min_sure_share || unc { continue; }
+            }
+            new.push(region(rasters, &pixels, class, settings.max_hole_share));
+        }
         let is_large = |seen: &&Seen| seen.pixels.len() >= limit_px(rasters.view[seen.pixels[0]]);
         let gone = descriptors.iter().filter(is_large).filter(|seen| seen.is_gone(&evidence)).map(|seen| {
             let shown = seen.pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
             region(rasters, &seen.pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
         });
-        Ok(gone.chain(added).collect())
+        Ok(gone.chain(new).collect())
     }
 
     fn limit_px(&self, classes: &ClassTable, class: u8, image_px: usize) -> usize {

@@ -16,6 +16,7 @@ pub mod region;
 pub mod removal;
 pub mod settings;
 pub mod tolerance;
+pub mod uncovered;
 
 pub use detector::ClassDifference;
 pub use settings::Settings;

@@ -26,6 +26,8 @@ pub const SCHEMA: &str = r#"{
       "description": "radius of the largest disk inside a region, at least, px" },
     "max_hole_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.1,
       "description": "largest hole that is filled, share of its region" },
+    "min_sure_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.75,
+      "description": "share of a material region's pixels that no pose error explains, at least" },
     "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.5,
       "description": "a descriptor is still there when the photo shows its class on this share of its pixels" },
     "removal_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.7,
@@ -57,6 +59,7 @@ pub struct Settings {
     pub max_tolerance_px: u8,
     pub min_radius_px: f64,
     pub max_hole_share: f64,
+    pub min_sure_share: f64,
     pub still_share: f64,
     pub removal_share: f64,
 }
