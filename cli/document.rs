@@ -25,6 +25,7 @@ pub fn located(
         "longitude": position.map(|position| position.longitude_deg),
         "score": localization.score,
         "covariance": localization.covariance,
+        "alignment": localization.alignment,
         "reliable": located.is_reliable(),
         "reasons": located.reasons,
         "gates": gates(&located.gates),

@@ -74,7 +74,8 @@ fn main() -> anyhow::Result<()> {
 
     let camera = ToyCamera::intrinsics(960, 720, 120.0);
     let pose = Pose { position: GridPoint::new(0.0, 0.0, 1.6), yaw_rad: 0.0, pitch_rad: 0.1, roll_rad: 0.0 };
-    let estimate = PoseEstimate { pose, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0 };
+    let estimate =
+        PoseEstimate { pose, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0, alignment: None };
     let host = ToyHost::new(surveyed, camera);
     let photo = ToyHost::new(real, camera).labels(&pose);
     let capture = host.capture(photo, estimate);

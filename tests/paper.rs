@@ -54,7 +54,13 @@ fn proposals(real: ToyScene, taken: Pose, believed: Pose, profile: &str) -> Vec<
     let camera = ToyCamera::intrinsics(960, 720, 120.0);
     let host = ToyHost::new(surveyed(), camera);
     let photo = ToyHost::new(real, camera).labels(&taken);
-    let estimate = PoseEstimate { pose: believed, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0 };
+    let estimate = PoseEstimate {
+        pose: believed,
+        covariance: [[0.0; 3]; 3],
+        height_sigma_m: 0.0,
+        tilt_sigma_rad: 0.0,
+        alignment: None,
+    };
     let capture = host.capture(photo, estimate);
     let comparison = capture.comparison();
     let regions = plugin::<ClassDifference>(profile).detect(&host, &comparison).expect("detects");
@@ -88,7 +94,8 @@ fn eq_8_a_region_is_where_class_names_differ_whatever_their_numbers() {
     let at = pose(0.0, 2.0, 0.0);
     let photo = ToyHost::new(with_banner(), camera).labels(&at);
     let banner_px = photo.iter().filter(|&&label| label == BANNER.0).count();
-    let estimate = PoseEstimate { pose: at, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0 };
+    let estimate =
+        PoseEstimate { pose: at, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0, alignment: None };
     let capture = host.capture(photo, estimate);
     let regions = plugin::<ClassDifference>("paper").detect(&host, &capture.comparison()).unwrap();
     assert_eq!(regions.len(), 1);

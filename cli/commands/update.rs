@@ -11,7 +11,7 @@ use crate::prior::{Placed, read_placed};
 use crate::report::{Reports, Seen, Sheet};
 use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
-use resurvey_core::capture::{Capture, read_pose};
+use resurvey_core::capture::{Capture, GivenPose, read_given_pose};
 use resurvey_core::crs::Crs;
 use resurvey_core::localize::{GateLimits, Located, SceneServices, World, localize};
 use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
@@ -31,7 +31,7 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
     refuse_one_for_several(options)?;
     let mut tools = Tools::load(options, plugins)?;
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
-    let given = options.pose.as_deref().map(read_pose).transpose()?;
+    let given = options.pose.as_deref().map(read_given_pose).transpose()?;
     let mut reports = options.report.as_deref().map(Reports::start).transpose()?;
     let mut documents = Vec::new();
     let mut code = Ok(NOTHING);
@@ -169,7 +169,7 @@ impl Run<'_> {
     fn capture(
         &mut self,
         path: &Path,
-        (given, prior): (Option<Pose>, &PriorFrom),
+        (given, prior): (Option<GivenPose>, &PriorFrom),
         tools: &mut Tools,
         reports: Option<&mut Reports>,
         console: &mut Console<'_>,
@@ -180,7 +180,7 @@ impl Run<'_> {
             }
             return Ok((document, 0));
         }
-        let work = self.read(path, given, prior, console)?;
+        let work = self.read(path, given.map(|given| given.pose), prior, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
         let used = (tools.matcher.info(), tools.comparers.used.as_slice());
@@ -242,12 +242,12 @@ impl Run<'_> {
         &mut self,
         world: &World,
         capture: &Capture,
-        given: Option<Pose>,
+        given: Option<GivenPose>,
         tools: &mut Tools,
         console: &mut Console<'_>,
     ) -> Result<Located, Failure> {
-        if let Some(pose) = given {
-            return Ok(given_pose(world, pose, &tools.choices.gate));
+        if let Some(given) = given {
+            return Ok(given_pose(world, given, &tools.choices.gate));
         }
         let stage = console.stage("localize");
         let services = SceneServices::new(world, capture, self.crs, &stage);
@@ -416,8 +416,11 @@ impl Committed {
 }
 
 /// A pose that was given passes the gates, except inside a building: what it sees from there is no street.
-fn given_pose(world: &World, pose: Pose, limits: &GateLimits) -> Located {
-    let mut located = Located::new(exactly(pose), limits);
+fn given_pose(world: &World, given: GivenPose, limits: &GateLimits) -> Located {
+    let GivenPose { pose, covariance, alignment } = given;
+    let exact = exactly(pose);
+    let covariance = covariance.unwrap_or(exact.covariance);
+    let mut located = Located::new(Localization { covariance, alignment, ..exact }, limits);
     let is_inside = inside_solid(world.scene(true), pose.position);
     located.gates.push(Gate {
         name: "inside-building".to_owned(),
@@ -438,6 +441,7 @@ pub(super) fn exactly(pose: Pose) -> Localization {
         pose,
         score: 1.0,
         covariance: [[0.0; 3]; 3],
+        alignment: None,
         runner_up: None,
         candidates: 0,
         skipped: 0,

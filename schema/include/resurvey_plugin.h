@@ -163,6 +163,11 @@ typedef struct rsv_pose_estimate {
   rsv_pose pose;
   double covariance[9]; /* row-major over easting, northing, yaw */
   double height_sigma_m, tilt_sigma_rad;
+  uint32_t has_alignment;            /* 1: the fields below count */
+  uint32_t reserved_2;
+  double alignment_covariance[21];   /* over easting, northing, yaw, height, pitch, roll: lower triangle, row by row */
+  double map_sigma_m;                /* by which walls stand off the map */
+  double label_sigma_px;             /* by which contours of the labels wander */
 } rsv_pose_estimate;
 
 /* The map as seen from a pose. All four images have one size. */
@@ -236,6 +241,11 @@ typedef struct rsv_localization {
   double runner_up_score_ratio; /* its likelihood over that of the pose, 0 to 1 */
   uint64_t candidates;          /* scored */
   uint64_t skipped;             /* left out: inside a solid building */
+  uint32_t has_alignment;            /* 1: the fields below count */
+  uint32_t reserved_2;
+  double alignment_covariance[21];   /* over easting, northing, yaw, height, pitch, roll: lower triangle, row by row */
+  double map_sigma_m;                /* by which walls stand off the map */
+  double label_sigma_px;             /* by which contours of the labels wander */
 } rsv_localization;
 
 /* A region in which photo and view disagree; left <= u < right, top <= v < bottom. */

@@ -18,6 +18,6 @@ pub use camera::{CameraModel, Intrinsics};
 pub use capture::{CameraFile, CaptureFile, PriorFile};
 pub use class::{Class, ClassId, ClassKind, ClassTable};
 pub use descriptor::{Descriptor, DynamicDescriptor, MaterialDescriptor, Uncertainty};
-pub use localization::{Localization, RunnerUp};
+pub use localization::{Alignment, Localization, RunnerUp};
 pub use position::{GridPoint, Pose, Wgs84};
 pub use region::{ChangeRegion, PixelBox, Proposal, Rejection};

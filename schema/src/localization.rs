@@ -1,6 +1,7 @@
 //! What a VPS matcher answers.
 
 use crate::position::Pose;
+use serde::{Deserialize, Serialize};
 
 /// The second-best place, more than 5 m from the best.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +10,36 @@ pub struct RunnerUp {
     pub distance_m: f64,
     /// Its likelihood over that of the best, 0–1; near 1 the answer is ambiguous.
     pub score_ratio: f64,
+}
+
+/// What aligning photo and view tells beyond the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Alignment {
+    /// Covariance over easting, northing (m), yaw (rad), height (m), pitch and roll (rad); row-major, symmetric.
+    pub covariance: [[f64; 6]; 6],
+    /// 1σ by which walls stand off the map, metres.
+    pub map_sigma_m: f64,
+    /// 1σ by which contours of the labels wander, pixels.
+    pub label_sigma_px: f64,
+}
+
+impl Alignment {
+    /// The lower triangle of the covariance, row by row.
+    pub fn lower_triangle(&self) -> [f64; 21] {
+        let mut pairs = (0..6).flat_map(|row| (0..=row).map(move |column| (row, column)));
+        std::array::from_fn(|_| pairs.next().map_or(0.0, |(row, column)| self.covariance[row][column]))
+    }
+
+    /// The symmetric matrix whose lower triangle, row by row, is `values`.
+    pub fn from_lower_triangle(values: &[f64; 21], map_sigma_m: f64, label_sigma_px: f64) -> Self {
+        let at = |row: usize, column: usize| {
+            let (high, low) = (row.max(column), row.min(column));
+            values[high * (high + 1) / 2 + low]
+        };
+        let covariance = std::array::from_fn(|row| std::array::from_fn(|column| at(row, column)));
+        Self { covariance, map_sigma_m, label_sigma_px }
+    }
 }
 
 /// A pose found by a matcher, with what the reliability gate needs. The gate itself is core's.
@@ -20,6 +51,8 @@ pub struct Localization {
     pub score: f64,
     /// Covariance over easting (m), northing (m) and yaw (rad); row-major, symmetric.
     pub covariance: [[f64; 3]; 3],
+    /// What the matcher knows beyond that; `None` when it did not align contours.
+    pub alignment: Option<Alignment>,
     /// The strongest other mode, if any was seen.
     pub runner_up: Option<RunnerUp>,
     /// Candidate poses that were scored.

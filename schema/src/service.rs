@@ -1,6 +1,7 @@
 //! Plain values that the host's services take and return.
 
 use crate::class::ClassId;
+use crate::localization::Alignment;
 use crate::position::{GridPoint, Pose};
 
 /// A set of class indices.
@@ -123,6 +124,8 @@ pub struct PoseEstimate {
     pub height_sigma_m: f64,
     /// 1σ of pitch and roll, radians.
     pub tilt_sigma_rad: f64,
+    /// What the matcher found out about all six degrees of freedom, the map and the labels; `None` when it does not say.
+    pub alignment: Option<Alignment>,
 }
 
 /// The phone's rough pose with its uncertainty, in the map frame.

@@ -68,7 +68,19 @@ fn calls() -> Facts {
     facts!(
         facts,
         "rsv_pose_estimate",
-        abi::PoseEstimate { size, reserved, pose, covariance, height_sigma_m, tilt_sigma_rad }
+        abi::PoseEstimate {
+            size,
+            reserved,
+            pose,
+            covariance,
+            height_sigma_m,
+            tilt_sigma_rad,
+            has_alignment,
+            reserved_2,
+            alignment_covariance,
+            map_sigma_m,
+            label_sigma_px
+        }
     );
     facts!(
         facts,
@@ -116,7 +128,12 @@ fn results() -> Facts {
             runner_up_distance_m,
             runner_up_score_ratio,
             candidates,
-            skipped
+            skipped,
+            has_alignment,
+            reserved_2,
+            alignment_covariance,
+            map_sigma_m,
+            label_sigma_px
         }
     );
     facts!(

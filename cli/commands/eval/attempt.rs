@@ -254,6 +254,7 @@ fn as_answer(capture: &Capture) -> Localization {
         pose: prior.pose,
         score: 1.0,
         covariance: [[position_m2, 0.0, 0.0], [0.0, position_m2, 0.0], [0.0, 0.0, prior.yaw_sigma_rad.powi(2)]],
+        alignment: None,
         runner_up: None,
         candidates: 1,
         skipped: 0,

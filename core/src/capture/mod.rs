@@ -22,6 +22,6 @@ pub use exif::{ExifError, read_exif};
 pub use fix::{Fix, Heading, North, SensedDatum, SensedHeight};
 pub use load::Capture;
 pub use nmea::{NMEA_REACH_S, NmeaError, NmeaLog, SentenceCounts};
-pub use pose_file::read_pose;
+pub use pose_file::{GivenPose, read_given_pose, read_pose};
 pub use report::{PriorOrigin, PriorReport};
 pub use rough::{PriorSource, RoughCapture};

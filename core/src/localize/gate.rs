@@ -102,6 +102,7 @@ mod tests {
             pose: Pose { position, yaw_rad: 0.0, pitch_rad: 0.0, roll_rad: 0.0 },
             score: 0.9,
             covariance: [[0.5, 0.4, 0.0], [0.4, 0.5, 0.0], [0.0, 0.0, 1e-4]],
+            alignment: None,
             runner_up: Some(RunnerUp { distance_m: 12.0, score_ratio: 0.01 }),
             candidates: 1,
             skipped: 0,

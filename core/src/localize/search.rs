@@ -91,7 +91,16 @@ pub(super) fn search(
     modes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let covariance = scorer.covariance(&modes[0])?;
     let (pose, score) = (modes[0].pose, modes[0].score);
-    Ok(Localization { pose, score, covariance, runner_up: runner_up(&modes), candidates: scorer.scored, skipped, heat })
+    Ok(Localization {
+        pose,
+        score,
+        covariance,
+        alignment: None,
+        runner_up: runner_up(&modes),
+        candidates: scorer.scored,
+        skipped,
+        heat,
+    })
 }
 
 fn positions(centre: GridPoint, radius_m: f64) -> Vec<GridPoint> {

@@ -68,6 +68,14 @@ pub(super) fn localization(found: &Localization) -> Checked {
         }
     }
     (0..3).try_for_each(|axis| not_negative(&format!("covariance[{axis}][{axis}]"), c[axis][axis]))?;
+    if let Some(alignment) = &found.alignment {
+        finite("alignment.covariance", alignment.covariance.as_flattened())?;
+        (0..6).try_for_each(|axis| {
+            not_negative(&format!("alignment.covariance[{axis}][{axis}]"), alignment.covariance[axis][axis])
+        })?;
+        not_negative("alignment.map_sigma_m", alignment.map_sigma_m)?;
+        not_negative("alignment.label_sigma_px", alignment.label_sigma_px)?;
+    }
     if let Some(runner_up) = found.runner_up {
         not_negative("runner_up.distance_m", runner_up.distance_m)?;
         ratio("runner_up.score_ratio", runner_up.score_ratio)?;

@@ -147,6 +147,10 @@ pub(super) fn estimate(estimate: &PoseEstimate) -> abi::PoseEstimate {
         covariance: [a, b, c, d, e, f, g, h, i],
         height_sigma_m: estimate.height_sigma_m,
         tilt_sigma_rad: estimate.tilt_sigma_rad,
+        has_alignment: u32::from(estimate.alignment.is_some()),
+        alignment_covariance: estimate.alignment.map_or([0.0; 21], |alignment| alignment.lower_triangle()),
+        map_sigma_m: estimate.alignment.map_or(0.0, |alignment| alignment.map_sigma_m),
+        label_sigma_px: estimate.alignment.map_or(0.0, |alignment| alignment.label_sigma_px),
         ..abi::PoseEstimate::new()
     }
 }

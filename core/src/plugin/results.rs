@@ -5,8 +5,8 @@ use super::check::{Rules, Violation, violation};
 use super::lend::{read_growing, slice, text};
 use resurvey_schema::abi::{self, Growing, STATUS_FAILED, STATUS_OK, Status};
 use resurvey_schema::{
-    ChangeRegion, ClassId, Descriptor, DynamicDescriptor, Localization, MaterialDescriptor, PixelBox, Proposal,
-    Rejection, RunnerUp, Uncertainty,
+    Alignment, ChangeRegion, ClassId, Descriptor, DynamicDescriptor, Localization, MaterialDescriptor, PixelBox,
+    Proposal, Rejection, RunnerUp, Uncertainty,
 };
 use std::ffi::c_void;
 use std::sync::{Mutex, PoisonError};
@@ -209,6 +209,8 @@ pub(super) fn localization(from: &abi::Localization, heat: Vec<[f64; 3]>) -> Loc
         pose: from.pose.into(),
         score: from.score,
         covariance: [[a, b, c], [d, e, f], [g, h, i]],
+        alignment: (from.has_alignment != 0)
+            .then(|| Alignment::from_lower_triangle(&from.alignment_covariance, from.map_sigma_m, from.label_sigma_px)),
         runner_up: (from.has_runner_up != 0)
             .then_some(RunnerUp { distance_m: from.runner_up_distance_m, score_ratio: from.runner_up_score_ratio }),
         candidates: from.candidates,

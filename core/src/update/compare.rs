@@ -20,6 +20,7 @@ pub fn pose_estimate(localization: &Localization, capture: &Capture) -> PoseEsti
         covariance: localization.covariance,
         height_sigma_m: capture.prior.height_sigma_m.min(REFINED_HEIGHT_SIGMA_M),
         tilt_sigma_rad: capture.prior.tilt_sigma_rad.min(REFINED_TILT_SIGMA_RAD),
+        alignment: localization.alignment,
     }
 }
 

@@ -45,7 +45,7 @@ impl ClassDifference {
         comparison: &Comparison<'_>,
         rasters: &Rasters,
     ) -> Result<Vec<ChangeRegion>, Error> {
-        let settings = &self.settings;
+        let settings = &self.settings.for_photo(&comparison.estimate);
         let classes = host.classes();
         let tolerance = Tolerance::new(comparison, settings);
         let tolerance_px = tolerance.per_pixel(rasters);
@@ -74,8 +74,9 @@ impl ClassDifference {
                 let own = pixels.iter().filter(|pixel| !same_descriptor[**pixel]).count();
                 let share = sure.len() as f64 / own.max(1) as f64;
                 let unc = is_uncovered(host, comparison, rasters, &tolerance, &sure, class)?;
-                if std::env::var("DBG").is_ok() { eprintln!("REGION {class:?} px {} sure {share:.2} uncovered {unc}", pixels.len()); }
-                if share < settings.min_sure_share || unc { continue; }
+                if share < settings.min_sure_share || unc {
+                    continue;
+                }
             }
             new.push(region(rasters, &pixels, class, settings.max_hole_share));
         }

@@ -1,5 +1,6 @@
 //! What a user can set.
 
+use resurvey_plugin::PoseEstimate;
 use serde::Deserialize;
 
 /// JSON schema of [`Settings`].
@@ -17,9 +18,9 @@ pub const SCHEMA: &str = r#"{
     "tolerance_sigmas": { "type": "number", "minimum": 0, "maximum": 10, "default": 2.0,
       "description": "how many standard deviations of the pose are tolerated" },
     "label_jitter_px": { "type": "number", "minimum": 0, "maximum": 50, "default": 4.0,
-      "description": "how far contours of the photo's labels wander, px" },
+      "description": "how far contours of the photo's labels wander where the matcher does not say, px" },
     "map_tolerance_m": { "type": "number", "minimum": 0, "maximum": 5, "default": 0.25,
-      "description": "how far walls of the map are off, m" },
+      "description": "how far walls of the map are off where the matcher does not say, m" },
     "max_tolerance_px": { "type": "integer", "minimum": 0, "maximum": 200, "default": 32,
       "description": "upper bound of all tolerances together, px" },
     "min_radius_px": { "type": "number", "minimum": 0, "maximum": 200, "default": 4.0,
@@ -62,4 +63,15 @@ pub struct Settings {
     pub min_sure_share: f64,
     pub still_share: f64,
     pub removal_share: f64,
+}
+
+impl Settings {
+    /// The settings for one photo: how far its labels wander and walls stand off the map is what the matcher found, where
+    /// it says so.
+    pub fn for_photo(&self, estimate: &PoseEstimate) -> Self {
+        let Some(alignment) = &estimate.alignment else { return self.clone() };
+        let label_jitter_px = self.tolerance_sigmas * alignment.label_sigma_px;
+        let map_tolerance_m = self.tolerance_sigmas * alignment.map_sigma_m;
+        Self { label_jitter_px, map_tolerance_m, ..self.clone() }
+    }
 }

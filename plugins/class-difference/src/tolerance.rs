@@ -49,9 +49,12 @@ impl Tolerance {
 /// 1σ of the position, metres, in its worst direction, and of the attitude, radians.
 fn sigmas(estimate: &PoseEstimate) -> (f64, f64) {
     let [[ee, en, _], [_, nn, _], [_, _, yaw]] = estimate.covariance;
-    let plan = (ee + nn) / 2.0 + ((ee - nn) / 2.0).hypot(en);
-    let position_m = plan.max(0.0).sqrt().max(estimate.height_sigma_m);
-    (position_m, yaw.max(0.0).sqrt().max(estimate.tilt_sigma_rad))
+    let plan_m2 = (ee + nn) / 2.0 + ((ee - nn) / 2.0).hypot(en);
+    let (height_m2, tilt_rad2) = match &estimate.alignment {
+        Some(alignment) => (alignment.covariance[3][3], alignment.covariance[4][4].max(alignment.covariance[5][5])),
+        None => (estimate.height_sigma_m.powi(2), estimate.tilt_sigma_rad.powi(2)),
+    };
+    (plan_m2.max(height_m2).max(0.0).sqrt(), yaw.max(tilt_rad2).max(0.0).sqrt())
 }
 
 /// Gives every pixel the largest tolerance of those that reach it, along columns and then rows.

@@ -47,6 +47,7 @@ fn regions_with(map: ToyScene, photo: Vec<u8>, at: Pose, changes: &[(&str, serde
         covariance: [[0.0025, 0.0, 0.0], [0.0, 0.0025, 0.0], [0.0, 0.0, 1e-6]],
         height_sigma_m: 0.05,
         tilt_sigma_rad: 1e-3,
+        alignment: None,
     };
     let capture = host.capture(photo, estimate);
     let mut detector = ClassDifference::create(settings(changes)).expect("the defaults are accepted");
@@ -188,7 +189,13 @@ fn a_banner_replaced_by_metal_is_an_addition_and_no_removal() {
 #[test]
 fn images_of_different_size_are_an_error() {
     let host = host(wall());
-    let estimate = PoseEstimate { pose: pose(), covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0 };
+    let estimate = PoseEstimate {
+        pose: pose(),
+        covariance: [[0.0; 3]; 3],
+        height_sigma_m: 0.0,
+        tilt_sigma_rad: 0.0,
+        alignment: None,
+    };
     let capture = host.capture(host.labels(&pose()), estimate);
     let mut comparison = capture.comparison();
     let small = [0u8; 4];
@@ -201,8 +208,13 @@ fn images_of_different_size_are_an_error() {
 #[test]
 fn a_single_pixel_and_a_covariance_of_nan_are_survived() {
     let host = ToyHost::new(wall(), ToyCamera::intrinsics(1, 1, 120.0));
-    let estimate =
-        PoseEstimate { pose: pose(), covariance: [[f64::NAN; 3]; 3], height_sigma_m: f64::NAN, tilt_sigma_rad: 0.0 };
+    let estimate = PoseEstimate {
+        pose: pose(),
+        covariance: [[f64::NAN; 3]; 3],
+        height_sigma_m: f64::NAN,
+        tilt_sigma_rad: 0.0,
+        alignment: None,
+    };
     for class in [BANNER, CHAIR, ClassId::VOID] {
         let capture = host.capture(vec![class.0], estimate);
         let mut detector = ClassDifference::create(settings(&[])).expect("the defaults are accepted");

@@ -34,7 +34,8 @@ impl Estimator for Descriptors {
         comparison: &Comparison<'_>,
         regions: &[ChangeRegion],
     ) -> Result<Vec<Proposal>, Error> {
-        let sight = Sight::new(host, comparison, &self.settings)?;
+        let settings = self.settings.for_photo(&comparison.estimate);
+        let sight = Sight::new(host, comparison, &settings)?;
         let outlines = outlines(&sight, regions)?;
         let mut gone = BTreeSet::new();
         let mut proposals = Vec::new();

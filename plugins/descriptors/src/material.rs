@@ -219,6 +219,11 @@ impl Measurement<'_> {
         for nudge in nudges(&self.sight.comparison.estimate).ok_or(no_pose)? {
             variance.add(&self.corners, corners(&self.window, &self.plane, pixels, &nudge).as_ref());
         }
+        // The wall may stand elsewhere along its normal, and the rays then meet it elsewhere.
+        let wall_m = self.sight.comparison.estimate.alignment.map_or(0.0, |alignment| alignment.map_sigma_m);
+        let nudge = Nudge { offset: -self.plane.normal * wall_m, ..Nudge::none() };
+        variance.add(&self.corners, corners(&self.window, &self.plane, pixels, &nudge).as_ref());
+        variance.centre_m2 += wall_m.powi(2);
         Ok(Uncertainty {
             position_m: variance.centre_m2.sqrt(),
             size_m: Some(variance.size_m2.sqrt()),

@@ -1,5 +1,6 @@
 //! What a user can set.
 
+use resurvey_plugin::PoseEstimate;
 use serde::Deserialize;
 
 /// JSON schema of [`Settings`].
@@ -33,7 +34,7 @@ pub const SCHEMA: &str = r#"{
     "max_misfit": { "type": "number", "minimum": 0, "maximum": 100, "default": 3.0,
       "description": "largest 1-sigma of a contour about its rectangle, as a multiple of label_jitter_px" },
     "label_jitter_px": { "type": "number", "minimum": 0, "maximum": 50, "default": 2.0,
-      "description": "1-sigma by which contours of the photo's labels wander, px" },
+      "description": "1-sigma by which contours of the photo's labels wander where the matcher does not say, px" },
     "allow_partly_hidden": { "type": "boolean", "default": true,
       "description": "measure a rectangle of which something nearer hides a part" },
     "min_side_visible": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.5,
@@ -80,4 +81,12 @@ pub struct Settings {
     pub regularise: bool,
     pub max_level_angle_deg: f64,
     pub max_size_factor: f64,
+}
+
+impl Settings {
+    /// The settings for one photo: how far its labels wander is what the matcher found, where it says so.
+    pub fn for_photo(&self, estimate: &PoseEstimate) -> Self {
+        let found = estimate.alignment.map(|alignment| alignment.label_sigma_px);
+        Self { label_jitter_px: found.unwrap_or(self.label_jitter_px), ..self.clone() }
+    }
 }

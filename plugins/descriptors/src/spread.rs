@@ -1,8 +1,9 @@
 //! How an error of the pose spreads into what is measured: the pose is moved by one standard deviation along each of
 //! its independent directions, and the changes of the result are added in squares.
 
-use nalgebra::{Matrix3, Rotation3, SymmetricEigen, Unit, Vector3};
+use nalgebra::{Matrix6, Rotation3, SymmetricEigen, Unit, Vector3};
 use resurvey_plugin::PoseEstimate;
+use resurvey_plugin::schema::Pose;
 
 /// A pose moved by a little.
 #[derive(Clone, Copy, Debug)]
@@ -22,28 +23,44 @@ impl Nudge {
 
 /// The estimated pose moved by 1σ along each independent direction; `None` when a sigma is not finite.
 pub fn nudges(estimate: &PoseEstimate) -> Option<Vec<Nudge>> {
-    let covariance = Matrix3::from_fn(|row, column| estimate.covariance[row][column]);
-    let (height_m, tilt_rad) = (estimate.height_sigma_m, estimate.tilt_sigma_rad);
-    if !covariance.iter().all(|x| x.is_finite()) || !height_m.is_finite() || !tilt_rad.is_finite() {
+    let covariance = covariance(estimate);
+    if !covariance.iter().all(|x| x.is_finite()) {
         return None;
     }
-    // Yaw is clockwise, a rotation about the vertical is not.
-    let about = |axis: Unit<Vector3<f64>>, angle_rad: f64| Rotation3::from_axis_angle(&axis, angle_rad);
+    let Pose { yaw_rad, pitch_rad, .. } = estimate.pose;
+    let right = Unit::new_normalize(Vector3::new(yaw_rad.cos(), -yaw_rad.sin(), 0.0));
+    let ahead = Vector3::new(yaw_rad.sin() * pitch_rad.cos(), yaw_rad.cos() * pitch_rad.cos(), pitch_rad.sin());
+    let about = |axis: &Unit<Vector3<f64>>, angle_rad: f64| Rotation3::from_axis_angle(axis, angle_rad);
     let eigen = SymmetricEigen::new((covariance + covariance.transpose()) / 2.0);
-    let mut nudges: Vec<Nudge> = (0..3)
-        .map(|axis| eigen.eigenvectors.column(axis) * eigen.eigenvalues[axis].max(0.0).sqrt())
-        .map(|step| Nudge { offset: Vector3::new(step[0], step[1], 0.0), turn: about(Vector3::z_axis(), -step[2]) })
-        .collect();
-    nudges.push(Nudge { offset: Vector3::z() * height_m, ..Nudge::none() });
-    for axis in [Vector3::x_axis(), Vector3::y_axis()] {
-        nudges.push(Nudge { turn: about(axis, tilt_rad), ..Nudge::none() });
+    let moved = |axis: usize| {
+        let step = eigen.eigenvectors.column(axis) * eigen.eigenvalues[axis].max(0.0).sqrt();
+        // Yaw is clockwise, a rotation about the vertical is not.
+        let turn =
+            about(&Vector3::z_axis(), -step[2]) * about(&right, step[4]) * about(&Unit::new_normalize(ahead), step[5]);
+        Nudge { offset: Vector3::new(step[0], step[1], step[3]), turn }
+    };
+    Some((0..6).map(moved).collect())
+}
+
+/// Over easting, northing, yaw, height, pitch, roll: the matcher's own, or what is known of each alone.
+fn covariance(estimate: &PoseEstimate) -> Matrix6<f64> {
+    if let Some(alignment) = &estimate.alignment {
+        return Matrix6::from_fn(|row, column| alignment.covariance[row][column]);
     }
-    Some(nudges)
+    let mut covariance = Matrix6::zeros();
+    for (row, values) in estimate.covariance.iter().enumerate() {
+        values.iter().enumerate().for_each(|(column, value)| covariance[(row, column)] = *value);
+    }
+    covariance[(3, 3)] = estimate.height_sigma_m.powi(2);
+    covariance[(4, 4)] = estimate.tilt_sigma_rad.powi(2);
+    covariance[(5, 5)] = estimate.tilt_sigma_rad.powi(2);
+    covariance
 }
 
 /// 1σ of the position, metres, in its worst direction, and of the attitude, radians.
 pub fn pose_sigmas(estimate: &PoseEstimate) -> (f64, f64) {
-    let [[ee, en, _], [_, nn, _], [_, _, yaw]] = estimate.covariance;
-    let plan = (ee + nn) / 2.0 + ((ee - nn) / 2.0).hypot(en);
-    (plan.max(0.0).sqrt().max(estimate.height_sigma_m), yaw.max(0.0).sqrt().max(estimate.tilt_sigma_rad))
+    let c = covariance(estimate);
+    let plan_m2 = (c[(0, 0)] + c[(1, 1)]) / 2.0 + ((c[(0, 0)] - c[(1, 1)]) / 2.0).hypot(c[(0, 1)]);
+    let angle_rad2 = c[(2, 2)].max(c[(4, 4)]).max(c[(5, 5)]);
+    (plan_m2.max(c[(3, 3)]).max(0.0).sqrt(), angle_rad2.max(0.0).sqrt())
 }

@@ -2,6 +2,7 @@
 
 use crate::image::{Comparison, ImageRef, View};
 use crate::kinds::{Error, Photo};
+use resurvey_schema::Alignment;
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::service::{PoseEstimate, Prior};
 use resurvey_schema::{
@@ -138,6 +139,10 @@ pub(crate) unsafe fn comparison<'a>(comparison: *const abi::Comparison) -> Resul
             covariance: [[a, b, c], [d, e, f], [g, h, i]],
             height_sigma_m: estimate.height_sigma_m,
             tilt_sigma_rad: estimate.tilt_sigma_rad,
+            alignment: (estimate.has_alignment != 0).then(|| {
+                let (map_sigma_m, label_sigma_px) = (estimate.map_sigma_m, estimate.label_sigma_px);
+                Alignment::from_lower_triangle(&estimate.alignment_covariance, map_sigma_m, label_sigma_px)
+            }),
         },
     })
 }

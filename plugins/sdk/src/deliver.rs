@@ -133,6 +133,10 @@ pub(crate) fn localization_record(found: &Localization) -> abi::Localization {
         runner_up_score_ratio: found.runner_up.map_or(0.0, |runner_up| runner_up.score_ratio),
         candidates: found.candidates,
         skipped: found.skipped,
+        has_alignment: u32::from(found.alignment.is_some()),
+        alignment_covariance: found.alignment.map_or([0.0; 21], |alignment| alignment.lower_triangle()),
+        map_sigma_m: found.alignment.map_or(0.0, |alignment| alignment.map_sigma_m),
+        label_sigma_px: found.alignment.map_or(0.0, |alignment| alignment.label_sigma_px),
         ..abi::Localization::new()
     }
 }

@@ -1,15 +1,15 @@
 //! The pose at which the contours of view and photo coincide: least squares over six degrees of freedom, and how far it
 //! can be trusted.
 
-use crate::doubt::{Covariance, SAME_PLACE_M};
+use crate::doubt::SAME_PLACE_M;
 use crate::edges::{Edge, contours, displacement};
 use crate::likeness::Compared;
 use crate::mixed::{Sample, Solution, solve};
 use crate::mode::{Mode, angle_between};
 use crate::parts::{by_shift, join_strays, part_of};
 use crate::refine::{Move, Objective, moved};
-use nalgebra::{Matrix6, SMatrix, Vector6};
-use resurvey_plugin::schema::{ClassId, Pose};
+use nalgebra::{Matrix6, Vector6};
+use resurvey_plugin::schema::{Alignment as AlignmentRecord, ClassId, Pose};
 use resurvey_plugin::{Error, Host, Photo, Prior};
 
 /// Contour samples of one view.
@@ -46,15 +46,15 @@ pub struct Alignment<'a, 'p> {
 pub struct Aligned {
     /// The pose.
     pub pose: Pose,
-    /// Covariance over easting (m), northing (m), yaw (rad).
-    pub covariance: Covariance,
+    /// How far it can be trusted, and what was found out about map and labels.
+    pub alignment: AlignmentRecord,
 }
 
 impl Alignment<'_, '_> {
     /// Aligns `start`; `None` when too few contours find their counterpart.
     pub fn align(&self, start: &Pose) -> Result<Option<Aligned>, Error> {
         let mut pose = *start;
-        let mut covariance = Matrix6::zeros();
+        let mut last = None;
         for (stride, label_sigma_px) in ROUNDS {
             if self.host.cancelled() {
                 return Err(Error("cancelled".to_owned()));
@@ -63,9 +63,9 @@ impl Alignment<'_, '_> {
             let Some(solution) = self.solve(&samples, &pose) else { return Ok(None) };
             let length_m = solution.step.fixed_rows::<3>(0).norm();
             pose = moved(&pose, &(solution.step * (LONGEST_M / length_m.max(LONGEST_M))).into());
-            covariance = solution.covariance;
+            last = Some(solution);
         }
-        Ok(Some(Aligned { pose, covariance: in_grid(&covariance, pose.yaw_rad) }))
+        Ok(last.map(|solution| Aligned { pose, alignment: record(&solution, pose.yaw_rad) }))
     }
 
     /// Aligns the best of `modes` (sorted best first) and the best of another place, sorts `modes` anew, and returns the
@@ -74,7 +74,7 @@ impl Alignment<'_, '_> {
         &self,
         objective: &Objective<'_, '_>,
         modes: &mut [Mode],
-    ) -> Result<(Mode, Option<Covariance>), Error> {
+    ) -> Result<(Mode, Option<AlignmentRecord>), Error> {
         let elsewhere = elsewhere(modes).filter(|&index| index >= MODES);
         let mut aligned = Vec::new();
         for index in (0..modes.len().min(MODES)).chain(elsewhere) {
@@ -89,7 +89,7 @@ impl Alignment<'_, '_> {
         modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
         let best = aligned.iter().max_by(|a, b| a.0.log_posterior.total_cmp(&b.0.log_posterior));
         let (found, at_aligned, stayed) = best.ok_or_else(|| Error("no mode to align".to_owned()))?;
-        Ok((at_aligned.unwrap_or(*found), stayed.map(|aligned| aligned.covariance)))
+        Ok((at_aligned.unwrap_or(*found), stayed.map(|aligned| aligned.alignment)))
     }
 
     fn solve(&self, samples: &[Sample], pose: &Pose) -> Option<Solution> {
@@ -197,15 +197,21 @@ fn offset(prior: &Prior, pose: &Pose) -> Vector6<f64> {
     )
 }
 
-/// Covariance over easting, northing and yaw of a move in the axes of a camera with this heading.
-fn in_grid(covariance: &Matrix6<f64>, yaw_rad: f64) -> Covariance {
+/// What `solution` says, in the grid; a move is in the axes of a camera with this heading.
+fn record(solution: &Solution, yaw_rad: f64) -> AlignmentRecord {
     let (sin, cos) = yaw_rad.sin_cos();
-    let mut grid_from_camera = SMatrix::<f64, 3, 6>::zeros();
+    let mut grid_from_camera = Matrix6::zeros();
     (grid_from_camera[(0, 0)], grid_from_camera[(0, 1)]) = (cos, sin);
     (grid_from_camera[(1, 0)], grid_from_camera[(1, 1)]) = (-sin, cos);
-    grid_from_camera[(2, 3)] = 1.0;
-    let in_grid = grid_from_camera * covariance * grid_from_camera.transpose();
-    std::array::from_fn(|row| std::array::from_fn(|column| in_grid[(row, column)]))
+    for (grid, camera) in [(2, 3), (3, 2), (4, 4), (5, 5)] {
+        grid_from_camera[(grid, camera)] = 1.0;
+    }
+    let in_grid = grid_from_camera * solution.covariance * grid_from_camera.transpose();
+    AlignmentRecord {
+        covariance: std::array::from_fn(|row| std::array::from_fn(|column| in_grid[(row, column)])),
+        map_sigma_m: solution.map_sigma_m,
+        label_sigma_px: solution.label_sigma_px,
+    }
 }
 
 #[cfg(test)]
@@ -237,7 +243,8 @@ mod tests {
     fn forward_of_a_camera_that_looks_east_is_easting() {
         let mut covariance = Matrix6::zeros();
         (covariance[(0, 0)], covariance[(1, 1)], covariance[(3, 3)]) = (1.0, 4.0, 9.0);
-        let found = in_grid(&covariance, 90_f64.to_radians());
+        let solution = Solution { step: Vector6::zeros(), covariance, map_sigma_m: 0.1, label_sigma_px: 2.0 };
+        let found = record(&solution, 90_f64.to_radians()).covariance;
         assert!((found[0][0] - 4.0).abs() < 1e-12 && (found[1][1] - 1.0).abs() < 1e-12);
         assert!((found[2][2] - 9.0).abs() < 1e-12 && found[0][1].abs() < 1e-12);
     }

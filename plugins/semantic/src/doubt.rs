@@ -4,7 +4,7 @@ use crate::mode::{Mode, angle_between};
 use crate::refine::moved;
 use crate::settings::Settings;
 use resurvey_plugin::Error;
-use resurvey_plugin::schema::{Pose, RunnerUp};
+use resurvey_plugin::schema::{Alignment, Pose, RunnerUp};
 
 /// Over easting (m), northing (m) and yaw (rad).
 pub type Covariance = [[f64; 3]; 3];
@@ -51,6 +51,19 @@ pub fn with_floor(mut covariance: Covariance) -> Covariance {
         covariance[axis][axis] += floor * floor;
     }
     covariance
+}
+
+/// `alignment` with what the grid of label pixels leaves open.
+pub fn with_floors(mut alignment: Alignment) -> Alignment {
+    for (axis, floor) in [FLOOR[0], FLOOR[1], FLOOR[2], FLOOR[0], FLOOR[2], FLOOR[2]].into_iter().enumerate() {
+        alignment.covariance[axis][axis] += floor * floor;
+    }
+    alignment
+}
+
+/// The covariance of `alignment` over easting, northing and yaw.
+pub fn in_plan(alignment: &Alignment) -> Covariance {
+    std::array::from_fn(|row| std::array::from_fn(|column| alignment.covariance[row][column]))
 }
 
 /// `covariance` of an answer that no search around it bounds: at least 5 m, or the radius searched.

@@ -57,26 +57,29 @@ impl Searcher for Semantic {
         }
         let objective = Objective { host, photo, settings, compared: &compared, likeness };
         let alignment = Alignment { host, photo, compared: &compared, use_prior: settings.use_prior };
-        let (best, covariance) = if settings.refine {
+        let (best, aligned) = if settings.refine {
             objective.refine(&mut modes)?;
-            let (best, aligned) = alignment.best_of(&objective, &mut modes)?;
-            let spread = aligned.map(|covariance| Ok(doubt::with_floor(covariance)));
-            (best, spread.unwrap_or_else(|| objective.covariance(&best))?)
+            alignment.best_of(&objective, &mut modes)?
         } else {
-            let best = objective.rescore(&mut modes, &sweep)?;
-            (best, objective.covariance(&best)?)
+            (objective.rescore(&mut modes, &sweep)?, None)
+        };
+        let aligned = aligned.map(doubt::with_floors);
+        let covariance = match &aligned {
+            Some(aligned) => doubt::in_plan(aligned),
+            None => objective.covariance(&best)?,
         };
         let searched_m = sweep.radius_m().max(settings.spacing_m);
-        let covariance = if best.pose.position.plan_distance_m(&photo.prior.pose.position) > searched_m {
+        let (covariance, aligned) = if best.pose.position.plan_distance_m(&photo.prior.pose.position) > searched_m {
             // It climbed out of the searched circle: what else lies outside was never compared.
-            doubt::unbounded(covariance, searched_m)
+            (doubt::unbounded(covariance, searched_m), None)
         } else {
-            covariance
+            (covariance, aligned)
         };
         Ok(Localization {
             pose: best.pose,
             score: best.score.clamp(0.0, 1.0),
             covariance,
+            alignment: aligned,
             runner_up: doubt::runner_up(&modes, settings),
             candidates: coarse.scored,
             skipped: coarse.skipped,

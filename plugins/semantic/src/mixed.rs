@@ -44,6 +44,10 @@ pub struct Solution {
     pub step: Vector6<f64>,
     /// Its covariance.
     pub covariance: Matrix6<f64>,
+    /// 1σ of the map's shifts, metres.
+    pub map_sigma_m: f64,
+    /// 1σ of ε, pixels.
+    pub label_sigma_px: f64,
 }
 
 /// Normal equations of one part of the map.
@@ -61,7 +65,8 @@ pub fn solve(samples: &[Sample], prior: &Matrix6<f64>, to_prior: &Vector6<f64>) 
     let mut left: Vec<f64> = samples.iter().map(|sample| sample.residual_px).collect();
     let mut solution = None;
     for _ in 0..ROUNDS {
-        let parts = parts(samples, &left, scale(&left));
+        let label_sigma_px = scale(&left);
+        let parts = parts(samples, &left, label_sigma_px);
         let found: Vec<Found> =
             SHIFTS_M.iter().filter_map(|&[sigma_m, _]| at(&parts, sigma_m, prior, to_prior)).collect();
         if found.len() < SHIFTS_M.len() {
@@ -72,7 +77,7 @@ pub fn solve(samples: &[Sample], prior: &Matrix6<f64>, to_prior: &Vector6<f64>) 
             let shift = best.shifts.get(&sample.part).copied().unwrap_or_default();
             *left = sample.residual_px - sample.by_move.dot(&best.step) - sample.by_shift.dot(&shift);
         }
-        solution = Some(averaged(&found, best.log_likelihood));
+        solution = Some(Solution { label_sigma_px, ..averaged(&found, best.log_likelihood) });
     }
     solution
 }
@@ -90,7 +95,9 @@ fn averaged(found: &[Found], highest: f64) -> Solution {
         let by_shifts = found.covariance - without_shifts;
         (without_shifts + by_shifts * TOGETHER + off * off.transpose()) * weight
     });
-    Solution { step, covariance: covariance.sum() }
+    let map_variance_m2: f64 =
+        SHIFTS_M.iter().zip(&weights).map(|([sigma_m, _], weight)| sigma_m.powi(2) * weight / sum).sum();
+    Solution { step, covariance: covariance.sum(), map_sigma_m: map_variance_m2.sqrt(), label_sigma_px: 0.0 }
 }
 
 /// Robust 1σ: the median absolute residual of a normal distribution is 0.6745 σ.

@@ -63,6 +63,16 @@ pub struct PoseEstimate {
     pub height_sigma_m: f64,
     /// 1σ of pitch and roll, radians.
     pub tilt_sigma_rad: f64,
+    /// 1 when the fields on the alignment count.
+    pub has_alignment: u32,
+    /// Zero.
+    pub reserved_2: u32,
+    /// Covariance over easting, northing, yaw, height, pitch, roll: the lower triangle, row by row.
+    pub alignment_covariance: [f64; 21],
+    /// 1σ by which walls stand off the map, metres.
+    pub map_sigma_m: f64,
+    /// 1σ by which contours of the labels wander, pixels.
+    pub label_sigma_px: f64,
 }
 
 /// The map as seen from a pose.

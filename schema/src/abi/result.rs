@@ -44,6 +44,16 @@ pub struct Localization {
     pub candidates: u64,
     /// Candidates left out because they lie inside a solid building.
     pub skipped: u64,
+    /// 1 when the fields on the alignment count.
+    pub has_alignment: u32,
+    /// Zero.
+    pub reserved_2: u32,
+    /// Covariance over easting, northing, yaw, height, pitch, roll: the lower triangle, row by row.
+    pub alignment_covariance: [f64; 21],
+    /// 1σ by which walls stand off the map, metres.
+    pub map_sigma_m: f64,
+    /// 1σ by which contours of the labels wander, pixels.
+    pub label_sigma_px: f64,
 }
 
 /// A region in which photo and view disagree. In arrays it comes with a byte step.

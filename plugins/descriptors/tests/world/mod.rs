@@ -76,6 +76,7 @@ pub fn estimate(pose: Pose, position_m: f64, angle_deg: f64) -> PoseEstimate {
         covariance: [[variance_m2, 0.0, 0.0], [0.0, variance_m2, 0.0], [0.0, 0.0, angle_rad * angle_rad]],
         height_sigma_m: position_m / 2.0,
         tilt_sigma_rad: angle_rad,
+        alignment: None,
     }
 }
 

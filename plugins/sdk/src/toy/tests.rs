@@ -73,7 +73,13 @@ fn descriptors_are_seen_only_when_asked_for() {
     let pose = level(GridPoint::new(0.0, 0.0, 1.6), 0.0);
     let capture = host.capture(
         host.labels(&pose),
-        crate::PoseEstimate { pose, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0 },
+        crate::PoseEstimate {
+            pose,
+            covariance: [[0.0; 3]; 3],
+            height_sigma_m: 0.0,
+            tilt_sigma_rad: 0.0,
+            alignment: None,
+        },
     );
     let comparison = capture.comparison();
     let seen = comparison.view.features.at(48, 45);
