@@ -1,7 +1,7 @@
 //! Maps and captures on disk, in the layout that `score.py` and `resurvey eval` read.
 
 use super::capture::{Case, CaseSpec};
-use super::change::ChangeKind;
+use super::kind::ChangeKind;
 use super::model::Model;
 use super::noise::NoiseLevel;
 use super::scene::{Scene, SceneKind};
