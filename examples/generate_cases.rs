@@ -12,7 +12,7 @@ mod synthetic;
 
 use clap::Parser;
 use std::path::PathBuf;
-use synthetic::{ChangeKind, Changes, NoiseLevel, SceneKind, Suite, full_suite, write_suite};
+use synthetic::{ChangeKind, Changes, NoiseLevel, SceneKind, Suite, full_suite, write_suite, write_suite_with_seconds};
 
 /// Captures of each place and noise of `--suite`: 208 in all.
 const SUITE_COUNT: usize = 26;
@@ -38,6 +38,9 @@ struct Arguments {
     /// Number of captures, 10 when left out; with --suite of each place and noise, 26 when left out (208 in all).
     #[arg(long)]
     count: Option<usize>,
+    /// Each capture gets a second photo of the same changed place, as CASE/second, where a pose 3 to 8 m away shows it.
+    #[arg(long)]
+    second: bool,
     /// The place and the captures follow from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -47,7 +50,7 @@ struct Arguments {
 }
 
 fn main() -> anyhow::Result<()> {
-    let Arguments { suite, scene, noise, change, count, seed, out } = Arguments::parse();
+    let Arguments { suite, scene, noise, change, count, second, seed, out } = Arguments::parse();
     let changes = change.map_or(Changes::InTurn, Changes::Only);
     let suites = if suite {
         full_suite(seed, count.unwrap_or(SUITE_COUNT))
@@ -55,7 +58,8 @@ fn main() -> anyhow::Result<()> {
         vec![Suite { scene, seed, capture_seed: seed, count: count.unwrap_or(COUNT), noise, changes }]
     };
     for suite in suites {
-        for folder in write_suite(&suite, &out)? {
+        let folders = if second { write_suite_with_seconds(&suite, &out)? } else { write_suite(&suite, &out)? };
+        for folder in folders {
             println!("{}", folder.display());
         }
     }

@@ -41,6 +41,11 @@ impl Camera {
         Self { width: 960, height: 720, focal_px: Self::FOCAL_PX, position, yaw_rad, pitch_rad, roll_rad }
     }
 
+    /// The same view with a tenth of the columns and rows, for a quick look.
+    pub fn tenth(&self) -> Self {
+        Self { width: self.width / 10, height: self.height / 10, focal_px: self.focal_px / 10.0, ..*self }
+    }
+
     /// The camera's axes in the scene.
     pub fn axes(&self) -> Axes {
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();

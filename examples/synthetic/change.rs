@@ -44,6 +44,20 @@ pub struct Event {
     pub known: Vec<Placed>,
 }
 
+/// Share of a thing that a photo has to show.
+const SHOWN: f64 = 0.9;
+
+impl Event {
+    /// What the photo is about, each with the share that it has to show at least.
+    pub fn shows(&self) -> Vec<(&Placed, f64)> {
+        let placed = self.changes.iter().filter_map(|change| match change {
+            Change::Add(placed) | Change::Remove(placed) => Some((placed, SHOWN)),
+            Change::Repaint(..) => None,
+        });
+        placed.collect()
+    }
+}
+
 /// A photo of `world` (the place as it is) with a change of this kind; fails when no pose shows one.
 pub fn event(scene: &Scene, world: &World, kind: ChangeKind, random: &mut Random) -> anyhow::Result<Event> {
     for _ in 0..400 {
@@ -108,8 +122,7 @@ fn chairs(event: &mut Event, scene: &Scene, kind: ChangeKind, random: &mut Rando
 
 /// Turns the wall class of the building that fills most of the photo into glass, above the shops.
 fn repaint(event: &mut Event, scene: &Scene, camera: &Camera) -> Option<()> {
-    let small = Camera { width: 96, height: 72, focal_px: camera.focal_px / 10.0, ..*camera };
-    let seen = picture(&event.before, &small);
+    let seen = picture(&event.before, &camera.tenth());
     let mut counts = vec![0_u32; event.before.blocks.len()];
     for hit in &seen.hits {
         if let Thing::Block(index, _) = hit.thing {

@@ -13,7 +13,7 @@ pub const CHAIR_M: [f64; 3] = [0.5, 0.5, 0.9];
 /// Banners hang this far off their wall, metres.
 const OFF_WALL_M: f64 = 0.04;
 /// Everything that changes stays this far from the image's border, pixels.
-const BORDER_PX: f64 = 12.0;
+pub const BORDER_PX: f64 = 12.0;
 
 /// A pose at eye height that stands in nothing; half the time `None`, where it does.
 pub fn pose(scene: &Scene, world: &World, random: &mut Random) -> Option<Camera> {
@@ -83,13 +83,8 @@ pub fn is_well_seen(world: &World, camera: &Camera, panel: &Panel, range_m: [f64
     let [a, b, c, d] = panel.corners;
     let centre = [0, 1, 2].map(|i| (a[i] + c[i]) / 2.0);
     let to_camera = subtract(camera.position, centre);
-    let normal = {
-        let along = subtract(b, a);
-        let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
-        [along[1] / length, -along[0] / length, 0.0]
-    };
     let range = distance_m(camera.position, centre);
-    let is_facing = dot(normal, to_camera) > range * 65_f64.to_radians().cos();
+    let is_facing = dot(outward(panel), to_camera) > range * 65_f64.to_radians().cos();
     let is_in_range = (range_m[0]..range_m[1]).contains(&range);
     let is_held = |corner| camera.pixel(&axes, corner).is_some_and(|pixel| camera.holds(pixel, BORDER_PX));
     is_facing && is_in_range && panel.corners.into_iter().all(is_held) && {
@@ -104,6 +99,13 @@ pub fn is_well_seen(world: &World, camera: &Camera, panel: &Panel, range_m: [f64
             hit.thing == mine
         })
     }
+}
+
+/// Outward unit normal of a panel.
+pub fn outward(panel: &Panel) -> Offset {
+    let along = subtract(panel.corners[1], panel.corners[0]);
+    let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
+    [along[1] / length, -along[0] / length, 0.0]
 }
 
 /// Ground contact of an object that is wholly in the image and hidden by nothing.

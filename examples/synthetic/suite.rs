@@ -4,10 +4,13 @@ use super::capture::{Case, CaseSpec};
 use super::kind::ChangeKind;
 use super::model::Model;
 use super::noise::NoiseLevel;
+use super::photo::Photo;
 use super::scene::{Scene, SceneKind};
+use super::truth::Truth;
 use super::{glb, label_png, three_ds};
 use anyhow::Context;
 use resurvey_core::crs::{Crs, GridPoint};
+use resurvey_schema::CaptureFile;
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -93,13 +96,13 @@ pub fn write_map(scene: &Scene, directory: &Path) -> anyhow::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Writes one capture under `directory` and returns its directory.
+/// Writes one capture under `directory` and returns its directory, which holds a second photo, if any, as `second`.
 pub fn write_case(case: &Case, directory: &Path) -> anyhow::Result<PathBuf> {
     let folder = directory.join(&case.spec.name);
-    fs::create_dir_all(&folder).with_context(|| format!("making {}", folder.display()))?;
-    write(&folder.join("labels.png"), &label_png::encode(&case.labels, case.width)?)?;
-    write(&folder.join("capture.json"), serde_json::to_string_pretty(&case.capture)?.as_bytes())?;
-    write(&folder.join("truth.json"), serde_json::to_string_pretty(&case.truth.json)?.as_bytes())?;
+    write_photo(&case.labels, case.width, &case.capture, &case.truth, &folder)?;
+    if let Some(Photo { capture, labels, width, truth }) = &case.second {
+        write_photo(labels, *width, capture, truth, &folder.join("second"))?;
+    }
     if !case.base_changes.is_empty() {
         let lines: String = case.base_changes.iter().map(|line| format!("{line}\n")).collect();
         write(&folder.join("base.changes.jsonl"), lines.as_bytes())?;
@@ -107,11 +110,25 @@ pub fn write_case(case: &Case, directory: &Path) -> anyhow::Result<PathBuf> {
     Ok(folder)
 }
 
+fn write_photo(labels: &[u8], width: usize, capture: &CaptureFile, truth: &Truth, folder: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("making {}", folder.display()))?;
+    write(&folder.join("labels.png"), &label_png::encode(labels, width)?)?;
+    write(&folder.join("capture.json"), serde_json::to_string_pretty(capture)?.as_bytes())?;
+    write(&folder.join("truth.json"), serde_json::to_string_pretty(&truth.json)?.as_bytes())
+}
+
 /// Writes the map and all captures of a suite; returns the captures' directories.
 pub fn write_suite(suite: &Suite, directory: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let scene = Scene::new(suite.scene, suite.seed);
     write_map(&scene, directory)?;
     suite.specs(&scene).into_iter().map(|spec| write_case(&Case::new(&scene, spec)?, directory)).collect()
+}
+
+/// The same, each capture with a second photo of the same changed place where one can be taken.
+pub fn write_suite_with_seconds(suite: &Suite, directory: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let scene = Scene::new(suite.scene, suite.seed);
+    write_map(&scene, directory)?;
+    suite.specs(&scene).into_iter().map(|spec| write_case(&Case::with_second(&scene, spec)?, directory)).collect()
 }
 
 /// Suites of every kind of scene at light and field noise, `count` captures of each, every other one without a change.

@@ -1,5 +1,6 @@
 //! `truth.json`: the true pose and what really changed.
 
+use super::camera::{Camera, distance_m};
 use super::capture::CaseSpec;
 use super::change::{Change, Event, Placed};
 use super::noise::NoiseLevel;
@@ -46,7 +47,7 @@ pub fn truth(
     labels: &[u8],
 ) -> Truth {
     let position = scene.grid(event.camera.position);
-    let attitude_deg = attitude_deg(event);
+    let attitude_deg = attitude_deg(&event.camera);
     let changes: Vec<TrueChange> = event.changes.iter().map(|change| true_change(scene, change)).collect();
     let known: Vec<Value> = event.known.iter().map(|placed| descriptor(scene, placed).1).collect();
     let [yaw, pitch, roll] = attitude_deg;
@@ -104,7 +105,7 @@ fn descriptor(scene: &Scene, placed: &Placed) -> ([f64; 3], Value) {
             let corners = panel.corners.map(|corner| scene.grid(corner));
             let [a, b, c, d] = panel.corners;
             let position = scene.grid([0, 1, 2].map(|i| (a[i] + b[i] + c[i] + d[i]) / 4.0));
-            let [width_m, height_m] = [b, d].map(|end| round(super::camera::distance_m(a, end), 4));
+            let [width_m, height_m] = [b, d].map(|end| round(distance_m(a, end), 4));
             let json = json!({"class": table.name(ClassId(panel.class)), "corners": corners,
                 "width_m": width_m, "height_m": height_m, "position": position});
             (position, json)
@@ -164,8 +165,7 @@ pub fn round(value: f64, digits: i32) -> f64 {
 }
 
 /// Yaw, pitch, roll, degrees, as written.
-pub fn attitude_deg(event: &Event) -> [f64; 3] {
-    let camera = &event.camera;
+pub fn attitude_deg(camera: &Camera) -> [f64; 3] {
     let [yaw, pitch, roll] = [camera.yaw_rad, camera.pitch_rad, camera.roll_rad].map(f64::to_degrees);
     [yaw.rem_euclid(360.0), pitch, roll].map(|value| round(value, 5))
 }
