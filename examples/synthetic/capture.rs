@@ -51,7 +51,7 @@ impl Case {
     /// The same capture, and a second photo of the changed place from 3 to 8 m away.
     pub fn with_second(scene: &Scene, spec: CaseSpec) -> anyhow::Result<Self> {
         let place = Place::new(scene, &spec)?;
-        let second = place.from_second_pose();
+        let second = place.seen_again();
         let second = second.map(|place| place.photo(Shot::Second)).transpose()?;
         Ok(Self { second, ..Self::of(&place, spec)? })
     }

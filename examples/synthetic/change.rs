@@ -7,6 +7,7 @@ use super::placing::{CHAIR_M, PEDESTRIAN_M, banner, is_clear, pose, standing};
 use super::random::Random;
 use super::scene::Scene;
 use super::world::{Block, Offset, Paint, Panel, World, class};
+use super::{cut, hide, replace, together};
 use anyhow::bail;
 
 /// A descriptor in the scene's frame.
@@ -25,6 +26,13 @@ pub enum Change {
     Add(Placed),
     /// Something gone.
     Remove(Placed),
+    /// Something the map knew that is now of another class, of another size or elsewhere.
+    Replace {
+        /// As the map knew it.
+        before: Placed,
+        /// As it is.
+        after: Placed,
+    },
     /// A block whose walls turned from one class into another.
     Repaint(String, u8, u8),
 }
@@ -42,62 +50,119 @@ pub struct Event {
     pub changes: Vec<Change>,
     /// Descriptors that the map has from before.
     pub known: Vec<Placed>,
+    /// New things that the photo shows only in part.
+    pub unmeasurable: Vec<Placed>,
+    /// Known things that are still there and that the photo hardly shows.
+    pub hidden: Vec<Placed>,
+    /// What hides them.
+    pub hiding: Vec<Block>,
+    /// Share of what it is about that the photo shows at least.
+    pub least_shown: f64,
 }
 
+/// Poses that are tried for a simple and for a hard kind of change.
+const TRIES: usize = 400;
+const HARD_TRIES: usize = 2000;
 /// Share of a thing that a photo has to show.
 const SHOWN: f64 = 0.9;
 
 impl Event {
-    /// What the photo is about, each with the share that it has to show at least.
-    pub fn shows(&self) -> Vec<(&Placed, f64)> {
+    fn new(world: &World, camera: Camera) -> Self {
+        Self {
+            camera,
+            before: world.clone(),
+            after: world.clone(),
+            changes: Vec::new(),
+            known: Vec::new(),
+            unmeasurable: Vec::new(),
+            hidden: Vec::new(),
+            hiding: Vec::new(),
+            least_shown: SHOWN,
+        }
+    }
+
+    /// What the photo is about: the changes, else what it cuts, else what the map knew.
+    pub fn shows(&self) -> Vec<&Placed> {
         let placed = self.changes.iter().filter_map(|change| match change {
-            Change::Add(placed) | Change::Remove(placed) => Some((placed, SHOWN)),
+            Change::Add(placed) | Change::Remove(placed) | Change::Replace { after: placed, .. } => Some(placed),
             Change::Repaint(..) => None,
         });
-        placed.collect()
+        let placed: Vec<&Placed> = placed.chain(&self.unmeasurable).collect();
+        if placed.is_empty() && self.changes.is_empty() { self.known.iter().collect() } else { placed }
+    }
+
+    /// Something new in the photo.
+    pub fn add(&mut self, placed: Placed) {
+        placed.put(&mut self.after);
+        self.changes.push(Change::Add(placed));
+    }
+
+    /// Something the map knew and the photo misses.
+    pub fn remove(&mut self, placed: Placed) {
+        placed.put(&mut self.before);
+        self.known.push(placed.clone());
+        self.changes.push(Change::Remove(placed));
+    }
+
+    /// Something the map knew that is another now.
+    pub fn replace(&mut self, before: Placed, after: Placed) {
+        before.put(&mut self.before);
+        after.put(&mut self.after);
+        self.known.push(before.clone());
+        self.changes.push(Change::Replace { before, after });
+    }
+
+    /// Something the map knew that is still there.
+    pub fn keep(&mut self, placed: Placed) {
+        placed.put(&mut self.before);
+        placed.put(&mut self.after);
+        self.known.push(placed);
     }
 }
 
 /// A photo of `world` (the place as it is) with a change of this kind; fails when no pose shows one.
 pub fn event(scene: &Scene, world: &World, kind: ChangeKind, random: &mut Random) -> anyhow::Result<Event> {
-    for _ in 0..400 {
+    let tries = if ChangeKind::HARD.contains(&kind) { HARD_TRIES } else { TRIES };
+    for _ in 0..tries {
         let Some(camera) = pose(scene, world, random) else { continue };
         if let Some(event) = change(scene, world, kind, camera, random) {
             return Ok(event);
         }
     }
-    bail!("no pose in scene {:?} shows a change of kind {:?} after 400 tries", scene.name(), kind.name())
+    bail!("no pose in scene {:?} shows a change of kind {:?} after {tries} tries", scene.name(), kind.name())
 }
 
 fn change(scene: &Scene, world: &World, kind: ChangeKind, camera: Camera, random: &mut Random) -> Option<Event> {
-    let mut event =
-        Event { camera, before: world.clone(), after: world.clone(), changes: Vec::new(), known: Vec::new() };
+    let mut event = Event::new(world, camera);
     match kind {
         ChangeKind::None => {}
         ChangeKind::Banner => {
-            let panel = banner(scene, world, &camera, random)?;
-            event.after.panels.push(panel.clone());
-            event.changes.push(Change::Add(Placed::Panel(panel)));
+            event.add(Placed::Panel(banner(scene, world, &camera, random)?));
         }
         ChangeKind::BannerRemoved => {
-            let panel = banner(scene, world, &camera, random)?;
-            event.before.panels.push(panel.clone());
-            event.known.push(Placed::Panel(panel.clone()));
-            event.changes.push(Change::Remove(Placed::Panel(panel)));
+            event.remove(Placed::Panel(banner(scene, world, &camera, random)?));
         }
         ChangeKind::Facade => repaint(&mut event, scene, &camera)?,
         ChangeKind::Pedestrian => {
-            let foot = standing(scene, world, &camera, PEDESTRIAN_M, random)?;
-            event.after.blocks.push(Block::object(class::PEDESTRIAN, foot, PEDESTRIAN_M, 0.0));
-            event.changes.push(Change::Add(Placed::Object(class::PEDESTRIAN, foot)));
+            let foot = standing(scene.object_range_m, world, &camera, PEDESTRIAN_M, random)?;
+            event.add(Placed::Object(class::PEDESTRIAN, foot));
         }
         ChangeKind::TwoChairs | ChangeKind::ChairRemoved => chairs(&mut event, scene, kind, random)?,
+        ChangeKind::BannerReplaced => replace::banner_replaced(&mut event, scene, random)?,
+        ChangeKind::BannerGrown => replace::banner_grown(&mut event, scene, random)?,
+        ChangeKind::ChairMoved => replace::chair_moved(&mut event, scene, random)?,
+        ChangeKind::Touching => together::touching(&mut event, scene, random)?,
+        ChangeKind::Several => together::several(&mut event, scene, random)?,
+        ChangeKind::Known => together::known(&mut event, scene, random)?,
+        ChangeKind::CutByBorder => cut::object(&mut event, scene, random)?,
+        ChangeKind::BannerCut => cut::banner(&mut event, scene, random)?,
+        ChangeKind::Hidden => hide::hidden(&mut event, scene, random)?,
     }
     Some(event)
 }
 
 fn chairs(event: &mut Event, scene: &Scene, kind: ChangeKind, random: &mut Random) -> Option<()> {
-    let first = standing(scene, &event.before, &event.camera, CHAIR_M, random)?;
+    let first = standing(scene.object_range_m, &event.before, &event.camera, CHAIR_M, random)?;
     let away = random.within(0.0, std::f64::consts::TAU);
     let apart = random.within(1.0, 1.4);
     let second = [first[0] + apart * away.cos(), first[1] + apart * away.sin(), 0.0];

@@ -20,11 +20,29 @@ pub enum ChangeKind {
     TwoChairs,
     /// One of two chairs the map knew is gone.
     ChairRemoved,
+    /// Where the map knew a banner hangs a panel of another material of nearly the same size.
+    BannerReplaced,
+    /// A banner the map knew is 30 to 60 % wider or higher now, one edge as before.
+    BannerGrown,
+    /// A chair the map knew stands 0.4 to 1.5 m elsewhere.
+    ChairMoved,
+    /// Two pedestrians, indoors chairs, that touch or overlap a little in the image.
+    Touching,
+    /// A banner and a pedestrian, indoors a chair, are new, and a banner the map knew is gone.
+    Several,
+    /// A new pedestrian or chair whose foot or side the image border cuts: nothing that can be measured.
+    CutByBorder,
+    /// A new banner that the image border cuts: nothing that can be measured.
+    BannerCut,
+    /// A banner or chair the map knew is still there behind a box that hides it.
+    Hidden,
+    /// A banner and a chair the map knew are still there and well seen.
+    Known,
 }
 
 impl ChangeKind {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 16] = [
         Self::None,
         Self::Banner,
         Self::BannerRemoved,
@@ -32,6 +50,28 @@ impl ChangeKind {
         Self::Pedestrian,
         Self::TwoChairs,
         Self::ChairRemoved,
+        Self::BannerReplaced,
+        Self::BannerGrown,
+        Self::ChairMoved,
+        Self::Touching,
+        Self::Several,
+        Self::CutByBorder,
+        Self::BannerCut,
+        Self::Hidden,
+        Self::Known,
+    ];
+
+    /// Those on which a map has to be read with care: changes on changes, several at once, things cut or hidden.
+    pub const HARD: [Self; 9] = [
+        Self::BannerReplaced,
+        Self::BannerGrown,
+        Self::ChairMoved,
+        Self::Touching,
+        Self::Several,
+        Self::CutByBorder,
+        Self::BannerCut,
+        Self::Hidden,
+        Self::Known,
     ];
 
     /// Name in `truth.json` and in paths.
@@ -44,14 +84,28 @@ impl ChangeKind {
             Self::Pedestrian => "pedestrian",
             Self::TwoChairs => "two_chairs",
             Self::ChairRemoved => "chair_removed",
+            Self::BannerReplaced => "banner_replaced",
+            Self::BannerGrown => "banner_grown",
+            Self::ChairMoved => "chair_moved",
+            Self::Touching => "touching",
+            Self::Several => "several",
+            Self::CutByBorder => "cut_by_border",
+            Self::BannerCut => "banner_cut",
+            Self::Hidden => "hidden",
+            Self::Known => "known",
         }
     }
 
-    /// The kinds that suit a scene.
+    /// The simple kinds that suit a scene.
     pub fn of(scene: &Scene) -> Vec<Self> {
         let outdoors = [Self::Banner, Self::None, Self::Pedestrian, Self::BannerRemoved, Self::Facade];
         let indoors = [Self::TwoChairs, Self::ChairRemoved, Self::Banner, Self::None];
         if scene.outdoors { outdoors.to_vec() } else { indoors.to_vec() }
+    }
+
+    /// All kinds that suit a scene, the hard ones last.
+    pub fn every(scene: &Scene) -> Vec<Self> {
+        [Self::of(scene), Self::HARD.to_vec()].concat()
     }
 }
 

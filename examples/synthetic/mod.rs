@@ -9,9 +9,11 @@ pub mod capture;
 pub mod caster;
 pub mod change;
 pub mod clutter;
+pub mod cut;
 pub mod facade;
 pub mod glb;
 pub mod hall;
+pub mod hide;
 pub mod kind;
 pub mod label_png;
 pub mod model;
@@ -20,12 +22,14 @@ pub mod photo;
 pub mod placing;
 pub mod prior;
 pub mod random;
+pub mod replace;
 pub mod scene;
 pub mod second;
 pub mod seen;
 pub mod street;
 pub mod suite;
 pub mod three_ds;
+pub mod together;
 pub mod truth;
 pub mod world;
 
@@ -34,5 +38,7 @@ pub use kind::ChangeKind;
 pub use noise::NoiseLevel;
 pub use photo::Photo;
 pub use scene::{Scene, SceneKind};
-pub use suite::{Changes, Suite, full_suite, write_case, write_map, write_suite, write_suite_with_seconds};
+pub use suite::{
+    Changes, Suite, every_suite, full_suite, write_case, write_map, write_suite, write_suite_with_seconds,
+};
 pub use truth::{TrueChange, Truth};

@@ -3,17 +3,22 @@
 use super::camera::Camera;
 use super::capture::CaseSpec;
 use super::caster::{Picture, picture};
-use super::change::{Event, event};
+use super::change::{Change, Event, Placed, event};
 use super::clutter::{add_clutter, real_world};
+use super::kind::ChangeKind;
 use super::noise::disturb;
 use super::prior::{PriorError, stated_yaw_sigma_deg};
 use super::random::Random;
 use super::scene::Scene;
 use super::second::second_camera;
+use super::seen::Seen;
 use super::truth::{Truth, attitude_deg, round, truth};
 use super::world::World;
 use resurvey_schema::capture::FORMAT;
 use resurvey_schema::{CameraFile, CaptureFile, PriorFile};
+
+/// Draws of trees and vehicles before a photo goes without them.
+const CLUTTER_TRIES: usize = 40;
 
 /// One photo with its truth.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,18 +76,17 @@ impl<'a> Place<'a> {
         let noise = &spec.noise;
         let real = real_world(scene, noise, &mut random(scene, spec, "map errors"));
         let event = event(scene, &real, spec.change, &mut random(scene, spec, "change"))?;
-        let mut cluttered = event.after.clone();
-        if scene.outdoors {
-            add_clutter(&mut cluttered, scene, noise, event.camera.position, &mut random(scene, spec, "clutter"));
-        }
+        let cluttered = cluttered(scene, spec, &event);
         Ok(Self { scene, event, spec: spec.clone(), cluttered })
     }
 
-    /// The same place as a second photo sees it; `None` when no pose near by shows the change.
-    pub fn from_second_pose(&self) -> Option<Self> {
+    /// The same place as a second photo sees it, whole things that the first one cuts; `None` when no pose near by shows the change.
+    pub fn seen_again(&self) -> Option<Self> {
         let mut random = random(self.scene, &self.spec, "second pose");
         let camera = second_camera(self.scene, &self.cluttered, &self.event, &mut random)?;
-        Some(Self { event: Event { camera, ..self.event.clone() }, ..self.clone() })
+        let mut event = Event { camera, ..self.event.clone() };
+        event.changes.extend(event.unmeasurable.drain(..).map(Change::Add));
+        Some(Self { event, ..self.clone() })
     }
 
     /// The photo from the camera of the event.
@@ -98,9 +102,35 @@ impl<'a> Place<'a> {
         let width = photo.width as usize;
         let labels = disturb(&photo.labels(), width, &spec.noise, &mut random(scene, spec, &shot.purpose("labels")));
         let error = PriorError::draw(scene, &spec.noise, &mut random(scene, spec, &shot.purpose("prior")));
-        let truth = truth(scene, spec, event, &error, [changed.len(), visible], &labels);
+        let truth = truth(scene, spec, event, &error, [changed.len(), visible], &labels, |placed| {
+            placed.seen(cluttered, camera).unwrap_or(Seen::NOTHING)
+        });
         Ok(Photo { capture: capture(scene, spec, camera, &error, shot)?, labels, width, truth })
     }
+}
+
+/// The place with trees and vehicles. Those of a hard kind do not stand before what the photo is about.
+fn cluttered(scene: &Scene, spec: &CaseSpec, event: &Event) -> World {
+    let mut plain = event.after.clone();
+    plain.blocks.extend(event.hiding.iter().cloned());
+    if !scene.outdoors {
+        return plain;
+    }
+    let mut random = random(scene, spec, "clutter");
+    let mut draw = || {
+        let mut world = plain.clone();
+        add_clutter(&mut world, scene, &spec.noise, event.camera.position, &mut random);
+        world
+    };
+    let first = draw();
+    if !ChangeKind::HARD.contains(&spec.change) {
+        return first;
+    }
+    let shown = |placed: &Placed, world: &World| placed.seen(world, &event.camera).map_or(0.0, |seen| seen.shown);
+    let things = event.shows();
+    let is_good =
+        |world: &World| things.iter().all(|placed| shown(placed, world) >= event.least_shown * shown(placed, &plain));
+    std::iter::once(first).chain((0..CLUTTER_TRIES).map(|_| draw())).find(is_good).unwrap_or(plain)
 }
 
 fn random(scene: &Scene, spec: &CaseSpec, purpose: &str) -> Random {

@@ -52,7 +52,13 @@ pub fn banner(scene: &Scene, world: &World, camera: &Camera, random: &mut Random
 }
 
 /// A panel on `wall` around `aimed`, moved to lie wholly on the wall; `None` when it does not fit.
-fn panel_on(block: &Block, wall: usize, aimed: Offset, [wide, tall]: [f64; 2], between_m: [f64; 2]) -> Option<Panel> {
+pub fn panel_on(
+    block: &Block,
+    wall: usize,
+    aimed: Offset,
+    [wide, tall]: [f64; 2],
+    between_m: [f64; 2],
+) -> Option<Panel> {
     let is_inside = block.name == "walls";
     let out = block.normal(wall).map(|n| if is_inside { -n } else { n });
     // Right as seen by someone in front of the wall.
@@ -110,13 +116,12 @@ pub fn outward(panel: &Panel) -> Offset {
 
 /// Ground contact of an object that is wholly in the image and hidden by nothing.
 pub fn standing(
-    scene: &Scene,
+    [near, far]: [f64; 2],
     world: &World,
     camera: &Camera,
     size_m: [f64; 3],
     random: &mut Random,
 ) -> Option<Offset> {
-    let [near, far] = scene.object_range_m;
     for _ in 0..60 {
         let (range, off) = (random.within(near, far), random.within(-45_f64, 45.0).to_radians());
         let heading = camera.yaw_rad + off;
@@ -128,20 +133,24 @@ pub fn standing(
     None
 }
 
-/// Whether an object at `foot` stands in nothing, and is wholly in the image and hidden by nothing.
-pub fn is_clear(world: &World, camera: &Camera, foot: Offset, size_m: [f64; 3]) -> bool {
-    let axes = camera.axes();
-    let object = Block::object(class::CHAIR, foot, size_m, 0.0);
-    let stands_free = world.blocks.iter().all(|block| {
+/// Whether an object at `foot` stands in nothing.
+pub fn stands_free(world: &World, foot: Offset) -> bool {
+    world.blocks.iter().all(|block| {
         if block.name == "walls" {
             block.covers([foot[0], foot[1]], -0.4)
         } else {
             !block.covers([foot[0], foot[1]], 0.4)
         }
-    });
+    })
+}
+
+/// Whether an object at `foot` stands in nothing, and is wholly in the image and hidden by nothing.
+pub fn is_clear(world: &World, camera: &Camera, foot: Offset, size_m: [f64; 3]) -> bool {
+    let axes = camera.axes();
+    let object = Block::object(class::CHAIR, foot, size_m, 0.0);
     let points: Vec<Offset> =
         object.corners().into_iter().flat_map(|[x, y]| [[x, y, 0.02], [x, y, object.top]]).collect();
-    stands_free
+    stands_free(world, foot)
         && points.into_iter().all(|point| {
             let is_held = camera.pixel(&axes, point).is_some_and(|pixel| camera.holds(pixel, BORDER_PX));
             is_held && cast(world, camera.position, subtract(point, camera.position)).distance > 0.999

@@ -10,7 +10,7 @@ use super::world::{Offset, World};
 /// Least and greatest distance between the two photos, metres.
 const AWAY_M: [f64; 2] = [3.0, 8.0];
 /// Poses that are tried.
-const TRIES: usize = 600;
+const TRIES: usize = 4000;
 /// The camera turns away from what it looks at by up to this, degrees.
 const AIM_SPREAD_DEG: f64 = 25.0;
 /// Pixels of a photo of a tenth of the size that a changed façade has to cover.
@@ -45,7 +45,7 @@ fn aim(event: &Event) -> Option<Offset> {
         _ => None,
     });
     let middles = repainted.map(|block| [block.centre[0], block.centre[1], 0.0]);
-    let centres: Vec<Offset> = event.shows().iter().map(|(placed, _)| placed.centre()).chain(middles).collect();
+    let centres: Vec<Offset> = event.shows().iter().map(|placed| placed.centre()).chain(middles).collect();
     let mean = |axis: usize| centres.iter().map(|centre| centre[axis]).sum::<f64>() / centres.len() as f64;
     (!centres.is_empty()).then(|| [0, 1, 2].map(mean))
 }
@@ -71,8 +71,8 @@ fn stands_free(scene: &Scene, world: &World, position: Offset) -> bool {
 fn shows(scene: &Scene, world: &World, event: &Event, camera: &Camera) -> bool {
     let things = event.shows();
     let is_repainted = event.changes.iter().any(|change| matches!(change, Change::Repaint(..)));
-    things.iter().all(|(placed, _)| placed.is_in_view(scene, camera))
-        && things.iter().all(|(placed, least)| placed.seen(world, camera).is_some_and(|seen| seen.shown >= *least))
+    things.iter().all(|placed| placed.is_in_view(scene, camera))
+        && things.iter().all(|placed| placed.seen(world, camera).is_some_and(|seen| seen.shown >= event.least_shown))
         && (!is_repainted || repainted_px(event, camera) >= REPAINTED_PX)
 }
 

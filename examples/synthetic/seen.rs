@@ -16,6 +16,11 @@ pub struct Seen {
     pub shown: f64,
 }
 
+impl Seen {
+    /// Of a thing behind the camera.
+    pub const NOTHING: Self = Self { outside: 1.0, shown: 0.0 };
+}
+
 /// Rays over the longer side of what is looked at.
 const RAYS: f64 = 40.0;
 /// A hit nearer than this share of the distance is something in front.
@@ -67,6 +72,12 @@ impl Placed {
         Some(bounds)
     }
 
+    /// Whether its pixels and those of `other` are at least `margin_px` apart.
+    pub fn is_apart(&self, other: &Self, camera: &Camera, margin_px: f64) -> bool {
+        let (Some(own), Some(others)) = (self.bounds_px(camera), other.bounds_px(camera)) else { return false };
+        (0..2).any(|i| own[i] > others[i + 2] + margin_px || others[i] > own[i + 2] + margin_px)
+    }
+
     /// How much of it a photo of `world` shows, whether or not it stands in that world; `None` behind the camera.
     pub fn seen(&self, world: &World, camera: &Camera) -> Option<Seen> {
         let [left, top, right, bottom] = self.bounds_px(camera)?;
@@ -107,7 +118,7 @@ impl Placed {
     }
 
     /// Whether a panel is seen at less than 65° from its normal; objects always are.
-    fn is_facing(&self, camera: &Camera) -> bool {
+    pub fn is_facing(&self, camera: &Camera) -> bool {
         let Self::Panel(panel) = self else { return true };
         let to_camera = subtract(camera.position, self.centre());
         let range = dot(to_camera, to_camera).sqrt();

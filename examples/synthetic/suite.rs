@@ -18,12 +18,27 @@ use std::path::{Path, PathBuf};
 /// Which changes the captures of a suite show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Changes {
-    /// All kinds that suit the scene in turn.
+    /// The simple kinds that suit the scene in turn.
     InTurn,
     /// One kind alone.
     Only(ChangeKind),
     /// Every other capture none, the others all other kinds in turn: for false updates per capture.
     HalfNone,
+    /// All kinds that suit the scene in turn, the hard ones as well.
+    Every,
+}
+
+impl std::str::FromStr for Changes {
+    type Err = anyhow::Error;
+
+    fn from_str(name: &str) -> anyhow::Result<Self> {
+        match name {
+            "simple" => Ok(Self::InTurn),
+            "half" => Ok(Self::HalfNone),
+            "every" => Ok(Self::Every),
+            _ => anyhow::bail!("unknown kinds {name:?}: expected simple, half or every"),
+        }
+    }
 }
 
 impl Changes {
@@ -33,6 +48,7 @@ impl Changes {
         match self {
             Self::InTurn => suitable,
             Self::Only(kind) => vec![kind],
+            Self::Every => ChangeKind::every(scene),
             Self::HalfNone => {
                 let real = suitable.into_iter().filter(|kind| *kind != ChangeKind::None);
                 real.flat_map(|kind| [ChangeKind::None, kind]).collect()
@@ -135,16 +151,38 @@ pub fn write_suite_with_seconds(suite: &Suite, directory: &Path) -> anyhow::Resu
 /// The two noises of a scene share its map, and no capture is the same with less noise.
 pub fn full_suite(seed: u64, count: usize) -> Vec<Suite> {
     let of_scene = |scene| {
-        [(NoiseLevel::LIGHT, seed), (NoiseLevel::FIELD, !seed)].map(|(noise, capture_seed)| Suite {
+        in_both_noises(Suite {
             scene,
             seed,
-            capture_seed,
+            capture_seed: seed,
             count,
-            noise,
+            noise: NoiseLevel::LIGHT,
             changes: Changes::HalfNone,
         })
     };
     SceneKind::ALL.into_iter().flat_map(of_scene).collect()
+}
+
+/// Suites of every kind of scene at light and field noise, each with every kind of change that suits it, `rounds` times.
+pub fn every_suite(seed: u64, rounds: usize) -> Vec<Suite> {
+    let of_scene = |scene| {
+        let count = rounds * ChangeKind::every(&Scene::new(scene, seed)).len();
+        in_both_noises(Suite {
+            scene,
+            seed,
+            capture_seed: seed,
+            count,
+            noise: NoiseLevel::LIGHT,
+            changes: Changes::Every,
+        })
+    };
+    SceneKind::ALL.into_iter().flat_map(of_scene).collect()
+}
+
+/// The same suite at light noise, and other captures of it at field noise.
+fn in_both_noises(light: Suite) -> [Suite; 2] {
+    let field = Suite { capture_seed: !light.seed, noise: NoiseLevel::FIELD, ..light.clone() };
+    [light, field]
 }
 
 /// Latitude and longitude, degrees, of a grid position with a height above HKPD.

@@ -6,6 +6,7 @@ use super::change::{Change, Event, Placed};
 use super::noise::NoiseLevel;
 use super::prior::PriorError;
 use super::scene::Scene;
+use super::seen::Seen;
 use resurvey_schema::{ClassId, ClassTable};
 use serde_json::{Map, Value, json};
 
@@ -45,13 +46,14 @@ pub fn truth(
     error: &PriorError,
     [changed, visible]: [usize; 2],
     labels: &[u8],
+    seen: impl Fn(&Placed) -> Seen,
 ) -> Truth {
     let position = scene.grid(event.camera.position);
     let attitude_deg = attitude_deg(&event.camera);
     let changes: Vec<TrueChange> = event.changes.iter().map(|change| true_change(scene, change)).collect();
     let known: Vec<Value> = event.known.iter().map(|placed| descriptor(scene, placed).1).collect();
     let [yaw, pitch, roll] = attitude_deg;
-    let json = json!({
+    let mut json = json!({
         "pose": {"easting": position[0], "northing": position[1], "height": position[2],
             "yaw_deg": yaw, "pitch_deg": pitch, "roll_deg": roll},
         "changes": changes.iter().map(|change| change.json.clone()).collect::<Vec<_>>(),
@@ -67,7 +69,23 @@ pub fn truth(
             "yaw_deg": round(error.yaw_deg, 3)},
         "label_share": label_share(labels),
     });
+    if !event.unmeasurable.is_empty() {
+        let cut =
+            event.unmeasurable.iter().map(|placed| with_share(scene, placed, "outside_share", seen(placed).outside));
+        json["unmeasurable"] = cut.collect();
+    }
+    if !event.hidden.is_empty() {
+        let hidden = event.hidden.iter().map(|placed| with_share(scene, placed, "shown_share", seen(placed).shown));
+        json["hidden"] = hidden.collect();
+    }
     Truth { position, attitude_deg, changes, json }
+}
+
+/// A descriptor with a share of it, 0–1.
+fn with_share(scene: &Scene, placed: &Placed, key: &str, share: f64) -> Value {
+    let mut json = descriptor(scene, placed).1;
+    json[key] = json!(round(share, 3));
+    json
 }
 
 fn noise_json(scene: &Scene, noise: &NoiseLevel) -> Value {
@@ -118,6 +136,7 @@ fn true_change(scene: &Scene, change: &Change) -> TrueChange {
     let (op, placed) = match change {
         Change::Add(placed) => ("add", placed),
         Change::Remove(placed) => ("remove", placed),
+        Change::Replace { after, .. } => ("add", after),
         Change::Repaint(object, from, to) => {
             let (from, to) = (table.name(ClassId(*from)), table.name(ClassId(*to)));
             let json = json!({"op": "modify", "object": object, "from": from, "to": to,
@@ -134,6 +153,9 @@ fn true_change(scene: &Scene, change: &Change) -> TrueChange {
     let mut json = json!({"op": op});
     for (key, value) in descriptor.as_object().into_iter().flatten() {
         json[key] = value.clone();
+    }
+    if let Change::Replace { before, .. } = change {
+        json["replaces"] = self::descriptor(scene, before).1;
     }
     TrueChange { op, class, position: Some(position), corners, json }
 }
