@@ -1,7 +1,6 @@
 //! Changes against the true ones: found, missed, false, and how far off.
 
-use super::bootstrap::{Bootstrap, Estimate};
-use super::statistics::median;
+use super::second_photo::SecondPhoto;
 use super::truth::{TrueChange, Truth};
 use crate::update::Change;
 use nalgebra::Vector3;
@@ -10,9 +9,7 @@ use resurvey_schema::{ClassTable, Descriptor, GridPoint};
 use serde::Serialize;
 
 /// A change further than this from the true one is another, and false, metres in plan.
-const SAME_CHANGE_M: f64 = 2.0;
-/// From this share on that nothing hides a change is expected to be found.
-const VISIBLE_SHARE: f64 = 0.8;
+pub(super) const SAME_CHANGE_M: f64 = 2.0;
 
 /// What the changes of one capture came to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,6 +22,8 @@ pub struct ChangeScore {
     pub visible_share: f64,
     /// Changes that the same capture made a second time, none if all is well; `None` when that run failed.
     pub second_run: Option<usize>,
+    /// What another photo of the same place did afterwards; `None` when there is none, or its run failed.
+    pub second_photo: Option<SecondPhoto>,
 }
 
 /// A true change.
@@ -36,17 +35,39 @@ pub struct ExpectedChange {
     pub class: String,
     /// Whether it is a rectangle on a surface; else an object on the ground.
     pub is_material: bool,
+    /// Whether it stands for one that the map knew.
+    pub is_replacement: bool,
     /// The change that was made of it.
     pub found: Option<FoundChange>,
+    /// The requirement that came nearest, where it was missed and that was asked for.
+    pub why_missed: Option<String>,
 }
 
 /// How far a change that was found is from the true one.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FoundChange {
     /// Centre or ground contact in plan, metres; `None` for a removal, whose place the map knew.
     pub position_off_m: Option<f64>,
     /// Area over the true one, per cent above 0; `None` for removals and objects.
     pub area_error_pct: Option<f64>,
+    /// Distance in 3D over the 1σ that the descriptor states; `None` where it states none.
+    pub position_sigmas: Option<f64>,
+    /// Absolute area error over the 1σ that the descriptor states; `None` where it states none.
+    pub area_sigmas: Option<f64>,
+    /// What became of the descriptor that it replaces; `None` where it replaces none.
+    pub replacement: Option<Replacement>,
+}
+
+/// How a descriptor that stands for one that the map knew came in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Replacement {
+    /// The one on the map was modified.
+    InPlace,
+    /// The one on the map was removed, and this one added.
+    RemovedAndAdded,
+    /// The one on the map is still there: the thing is on the map twice.
+    Beside,
 }
 
 /// A change that never happened.
@@ -61,38 +82,54 @@ pub struct FalseUpdate {
 }
 
 /// Scores `changes`, which were made of a capture with this `truth`, in their order: each takes the nearest true change
-/// of its kind and class within 2 m that is left.
+/// of its kind and class within 2 m that is left. Removing what a true change replaces is right and counts as no change
+/// of its own.
 pub fn score_changes(truth: &Truth, changes: &[Change], classes: &ClassTable) -> ChangeScore {
-    let wanted: Vec<&TrueChange> = truth.changes.iter().filter(|change| change.op != Op::Modify).collect();
+    let wanted = expected_changes(truth);
     let mut found: Vec<Option<FoundChange>> = vec![None; wanted.len()];
+    let mut removed = vec![false; wanted.len()];
     let mut false_updates = Vec::new();
     for change in changes {
         let (op, descriptor) = made(change);
-        let (class, at) = (classes.name(descriptor.class()), descriptor.anchor());
-        let candidates = wanted.iter().enumerate().filter(|(index, true_change)| {
-            let is_same_class = true_change.class.as_deref() == Some(class);
-            found[*index].is_none() && is_same_class && (op == Op::Remove) == (true_change.op == Op::Remove)
-        });
-        let with_distance =
-            candidates.filter_map(|(index, change)| Some((index, change.position?.plan_distance_m(&at))));
-        let nearest = with_distance.min_by(|a, b| a.1.total_cmp(&b.1));
-        match nearest.filter(|(_, distance_m)| *distance_m <= SAME_CHANGE_M) {
-            Some((index, distance_m)) => found[index] = Some(measured(op, descriptor, wanted[index], distance_m)),
-            None if is_piece_of_walls(truth, class) => {}
-            None => false_updates.push(FalseUpdate { op, class: class.to_owned(), position: at }),
+        let class = classes.name(descriptor.class());
+        if let Some((index, distance_m)) = nearest_true_change(&wanted, change, classes, |index| found[index].is_none())
+        {
+            found[index] = Some(measured(change, wanted[index], distance_m, classes));
+        } else if let Some(index) = replaced_by_removal(&wanted, &removed, change, classes) {
+            removed[index] = true;
+        } else if !is_piece_of_walls(truth, class) {
+            false_updates.push(FalseUpdate { op, class: class.to_owned(), position: descriptor.anchor() });
         }
     }
-    let expected = wanted.iter().zip(found).map(|(change, found)| ExpectedChange {
+    let expected = wanted.iter().zip(found).zip(removed).map(|((change, found), is_removed)| ExpectedChange {
         op: change.op,
         class: change.class.clone().unwrap_or_default(),
         is_material: change.corners.is_some(),
-        found,
+        is_replacement: change.replaces.is_some(),
+        found: found.map(|found| match found.replacement {
+            Some(Replacement::Beside) if is_removed => {
+                FoundChange { replacement: Some(Replacement::RemovedAndAdded), ..found }
+            }
+            _ => found,
+        }),
+        why_missed: None,
     });
-    ChangeScore { expected: expected.collect(), false_updates, visible_share: truth.visible_share(), second_run: None }
+    ChangeScore {
+        expected: expected.collect(),
+        false_updates,
+        visible_share: truth.visible_share(),
+        second_run: None,
+        second_photo: None,
+    }
+}
+
+/// The true changes that a descriptor can say.
+pub(super) fn expected_changes(truth: &Truth) -> Vec<&TrueChange> {
+    truth.changes.iter().filter(|change| change.op != Op::Modify).collect()
 }
 
 /// What `change` did, and the descriptor that says where.
-fn made(change: &Change) -> (Op, &Descriptor) {
+pub(super) fn made(change: &Change) -> (Op, &Descriptor) {
     match change {
         Change::Add(after) => (Op::Add, after),
         Change::Modify { after, .. } => (Op::Modify, after),
@@ -100,22 +137,77 @@ fn made(change: &Change) -> (Op, &Descriptor) {
     }
 }
 
-fn measured(op: Op, descriptor: &Descriptor, truth: &TrueChange, distance_m: f64) -> FoundChange {
+/// The nearest of the true changes that `is_left`, of the kind and class of `change` and within reach, and its distance
+/// in plan.
+pub(super) fn nearest_true_change(
+    wanted: &[&TrueChange],
+    change: &Change,
+    classes: &ClassTable,
+    is_left: impl Fn(usize) -> bool,
+) -> Option<(usize, f64)> {
+    let (op, descriptor) = made(change);
+    let (class, at) = (classes.name(descriptor.class()), descriptor.anchor());
+    let candidates = wanted.iter().enumerate().filter(|(index, true_change)| {
+        let is_same_class = true_change.class.as_deref() == Some(class);
+        is_left(*index) && is_same_class && (op == Op::Remove) == (true_change.op == Op::Remove)
+    });
+    let with_distance = candidates.filter_map(|(index, change)| Some((index, change.position?.plan_distance_m(&at))));
+    with_distance.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, distance_m)| *distance_m <= SAME_CHANGE_M)
+}
+
+/// The true change whose predecessor a removal takes off the map.
+fn replaced_by_removal(
+    wanted: &[&TrueChange],
+    removed: &[bool],
+    change: &Change,
+    classes: &ClassTable,
+) -> Option<usize> {
+    let Change::Remove { before, .. } = change else { return None };
+    let left = wanted.iter().enumerate().filter(|(index, _)| !removed[*index]);
+    let of_each = left.filter_map(|(index, change)| Some((index, replaced_off_m(change, before, classes)?)));
+    of_each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
+}
+
+/// Distance in plan of `before` from what `change` replaces, where `before` can be that.
+fn replaced_off_m(change: &TrueChange, before: &Descriptor, classes: &ClassTable) -> Option<f64> {
+    let replaced = change.replaces.as_ref().filter(|replaced| replaced.class == classes.name(before.class()))?;
+    Some(replaced.place()?.plan_distance_m(&before.anchor())).filter(|distance_m| *distance_m <= SAME_CHANGE_M)
+}
+
+fn measured(change: &Change, truth: &TrueChange, distance_m: f64, classes: &ClassTable) -> FoundChange {
+    let (op, descriptor) = made(change);
     if op == Op::Remove {
-        return FoundChange { position_off_m: None, area_error_pct: None };
+        return FoundChange::default();
     }
-    let area_error_pct = match (descriptor, &truth.corners) {
+    let areas_m2 = match (descriptor, &truth.corners) {
         (Descriptor::Material(material), Some(corners)) => {
-            Some(100.0 * (quad_area_m2(&material.corners) / quad_area_m2(corners) - 1.0))
-                .filter(|error| error.is_finite())
+            Some((quad_area_m2(&material.corners), quad_area_m2(corners)))
         }
         _ => None,
     };
-    FoundChange { position_off_m: Some(distance_m), area_error_pct }
+    let up_m = truth.position.map_or(0.0, |position| descriptor.anchor().height_m - position.height_m);
+    let sigma = descriptor.sigma();
+    let over = |error: f64, sigma: f64| Some(error / sigma).filter(|sigmas| sigmas.is_finite());
+    let is_in_place = match change {
+        Change::Modify { before, .. } => replaced_off_m(truth, before, classes).is_some(),
+        _ => false,
+    };
+    let replacement = if is_in_place { Replacement::InPlace } else { Replacement::Beside };
+    FoundChange {
+        position_off_m: Some(distance_m),
+        area_error_pct: areas_m2
+            .map(|(area_m2, true_m2)| 100.0 * (area_m2 / true_m2 - 1.0))
+            .filter(|error| error.is_finite()),
+        position_sigmas: sigma.and_then(|sigma| over(distance_m.hypot(up_m), sigma.position_m)),
+        area_sigmas: areas_m2
+            .zip(sigma.and_then(|sigma| sigma.area_m2))
+            .and_then(|((area_m2, true_m2), sigma_m2)| over((area_m2 - true_m2).abs(), sigma_m2)),
+        replacement: truth.replaces.is_some().then_some(replacement),
+    }
 }
 
 /// Whether walls that changed to `class` make a descriptor of that class a piece of what really changed.
-fn is_piece_of_walls(truth: &Truth, class: &str) -> bool {
+pub(super) fn is_piece_of_walls(truth: &Truth, class: &str) -> bool {
     truth.changes.iter().any(|change| change.op == Op::Modify && change.to.as_deref() == Some(class))
 }
 
@@ -133,110 +225,36 @@ fn quad_area_m2(corners: &[GridPoint; 4]) -> f64 {
     (b.cross(&c).norm() + c.cross(&d).norm()) / 2.0
 }
 
-/// Found of expected.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct ChangeTally {
-    /// Changes that were found.
-    pub found: usize,
-    /// Changes that should have been.
-    pub expected: usize,
-}
-
-/// Changes over many captures.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ChangeSummary {
-    /// Material changes of captures in which at least 80 % of what changed can be seen.
-    pub material: ChangeTally,
-    /// Dynamic ones.
-    pub dynamic: ChangeTally,
-    /// Share of both that was found; `None` when none was expected.
-    pub found: Option<Estimate>,
-    /// Changes that were made, true and false.
-    pub committed: usize,
-    /// Changes that never happened.
-    pub false_updates: usize,
-    /// Captures without a true addition or removal.
-    pub captures_without_change: usize,
-    /// False updates per 100 of those.
-    pub false_per_100_without_change: Option<Estimate>,
-    /// Median distance in plan of what was placed from where it is, metres.
-    pub position_off_median_m: Option<f64>,
-    /// Median of the absolute area errors of what was placed, per cent.
-    pub area_error_median_pct: Option<f64>,
-    /// Captures that changed the map a second time, or failed to.
-    pub not_idempotent: usize,
-}
-
-impl ChangeSummary {
-    /// Of `scores`, one a capture.
-    pub fn of(scores: &[&ChangeScore], bootstrap: &Bootstrap) -> Self {
-        let seen = |score: &&&ChangeScore| score.visible_share >= VISIBLE_SHARE;
-        let tally = |score: &ChangeScore, picks: fn(&ExpectedChange) -> bool| {
-            let expected = score.expected.iter().filter(|change| picks(change));
-            let found = expected.clone().filter(|change| change.found.is_some()).count();
-            ChangeTally { found, expected: expected.count() }
-        };
-        let total = |picks: fn(&ExpectedChange) -> bool| {
-            scores.iter().filter(seen).map(|score| tally(score, picks)).fold(ChangeTally::default(), |sum, one| {
-                ChangeTally { found: sum.found + one.found, expected: sum.expected + one.expected }
-            })
-        };
-        let of_all = |score: &ChangeScore| tally(score, |_| true);
-        let found = || scores.iter().flat_map(|score| &score.expected).filter_map(|change| change.found);
-        let tallies: Vec<ChangeTally> = scores.iter().filter(seen).map(|score| of_all(score)).collect();
-        let unchanged: Vec<f64> = scores
-            .iter()
-            .filter(|score| score.expected.is_empty())
-            .map(|score| score.false_updates.len() as f64)
-            .collect();
-        let false_updates = scores.iter().map(|score| score.false_updates.len()).sum();
-        let area_errors: Vec<f64> = found().filter_map(|found| found.area_error_pct).map(f64::abs).collect();
-        Self {
-            material: total(|change| change.is_material),
-            dynamic: total(|change| !change.is_material),
-            found: bootstrap.estimate(tallies.len(), |sample| {
-                let sum = |pick: fn(&ChangeTally) -> usize| sample.iter().map(|&i| pick(&tallies[i])).sum::<usize>();
-                sum(|tally| tally.found) as f64 / sum(|tally| tally.expected) as f64
-            }),
-            committed: found().count() + false_updates,
-            false_updates,
-            captures_without_change: unchanged.len(),
-            false_per_100_without_change: bootstrap.estimate(unchanged.len(), |sample| {
-                100.0 * sample.iter().map(|&i| unchanged[i]).sum::<f64>() / sample.len() as f64
-            }),
-            position_off_median_m: median(&found().filter_map(|found| found.position_off_m).collect::<Vec<_>>()),
-            area_error_median_pct: median(&area_errors),
-            not_idempotent: scores.iter().filter(|score| score.second_run != Some(0)).count(),
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use resurvey_schema::{ClassId, DynamicDescriptor, MaterialDescriptor};
+    use resurvey_schema::{ClassId, DynamicDescriptor, MaterialDescriptor, Uncertainty};
 
-    const BANNER: ClassId = ClassId(3);
-    const CHAIR: ClassId = ClassId(5);
+    pub const BANNER: ClassId = ClassId(3);
+    pub const CHAIR: ClassId = ClassId(5);
 
     /// A banner 3 m wide and 2 m high whose centre is at 1.5, 0, 1.
-    fn truth(changes: &str) -> Truth {
+    pub fn truth(changes: &str) -> Truth {
         let pose = r#"{"easting":0,"northing":0,"height":0,"yaw_deg":0,"pitch_deg":0,"roll_deg":0}"#;
         serde_json::from_str(&format!(r#"{{"pose":{pose},"scene":"street","changes":[{changes}]}}"#)).unwrap()
     }
 
-    const ADDED: &str = r#"{"op":"add","class":"banner","position":[1.5,0,1],
+    pub const ADDED: &str = r#"{"op":"add","class":"banner","position":[1.5,0,1],
         "corners":[[0,0,0],[3,0,0],[3,0,2],[0,0,2]]}"#;
-    const GONE: &str = r#"{"op":"remove","class":"chair","position":[10,10,0]}"#;
+    pub const GONE: &str = r#"{"op":"remove","class":"chair","position":[10,10,0]}"#;
+    /// The banner in the place of a metal panel that is 2.8 m wide.
+    const REPLACED: &str = r#"{"op":"add","class":"banner","position":[1.5,0,1],
+        "corners":[[0,0,0],[3,0,0],[3,0,2],[0,0,2]],
+        "replaces":{"class":"metal","corners":[[0.1,0,0],[2.9,0,0],[2.9,0,2],[0.1,0,2]]}}"#;
     const WALLS: &str = r#"{"op":"modify","object":"b7","from":"stone","to":"glass"}"#;
 
-    fn material(class: ClassId, width_m: f64, east_m: f64) -> Descriptor {
+    pub fn material(class: ClassId, width_m: f64, east_m: f64) -> Descriptor {
         let corner = |e, h| GridPoint::new(east_m + e, 0.0, h);
         let corners = [corner(0.0, 0.0), corner(width_m, 0.0), corner(width_m, 2.0), corner(0.0, 2.0)];
         Descriptor::Material(MaterialDescriptor { class, corners, normal: [0.0, -1.0, 0.0], sigma: None })
     }
 
-    fn chair(east_m: f64, north_m: f64) -> Descriptor {
+    pub fn chair(east_m: f64, north_m: f64) -> Descriptor {
         let position = GridPoint::new(east_m, north_m, 0.0);
         Descriptor::Dynamic(DynamicDescriptor {
             class: CHAIR,
@@ -247,7 +265,7 @@ mod tests {
         })
     }
 
-    fn score(truth: &Truth, changes: &[Change]) -> ChangeScore {
+    pub fn score(truth: &Truth, changes: &[Change]) -> ChangeScore {
         score_changes(truth, changes, &ClassTable::default())
     }
 
@@ -288,20 +306,55 @@ mod tests {
     }
 
     #[test]
-    fn a_summary_counts_what_can_be_seen_and_what_never_happened() {
-        let truth_of_both = truth(&[ADDED, GONE].join(","));
-        let mut good = score(&truth_of_both, &[Change::Add(material(BANNER, 3.0, 0.2))]);
-        good.second_run = Some(0);
-        let hidden = ChangeScore { visible_share: 0.71, ..score(&truth(ADDED), &[]) };
-        let wrong = ChangeScore { second_run: Some(0), ..score(&truth(""), &[Change::Add(chair(3.0, 3.0))]) };
-        let summary = ChangeSummary::of(&[&good, &hidden, &wrong], &Bootstrap::default());
-        assert_eq!(summary.material, ChangeTally { found: 1, expected: 1 });
-        assert_eq!(summary.dynamic, ChangeTally { found: 0, expected: 1 });
-        assert!((summary.found.unwrap().value - 0.5).abs() < 1e-12);
-        assert_eq!((summary.committed, summary.false_updates, summary.captures_without_change), (2, 1, 1));
-        assert!((summary.false_per_100_without_change.unwrap().value - 100.0).abs() < 1e-9);
-        assert!((summary.position_off_median_m.unwrap() - 0.2).abs() < 1e-9);
-        assert!(summary.area_error_median_pct.unwrap().abs() < 1e-9);
-        assert_eq!(summary.not_idempotent, 1);
+    fn errors_are_compared_with_the_sigmas_that_the_descriptor_states() {
+        // 0.3 m east and 0.4 m up: 0.5 m in 3D for 0.2 m, 2.5 σ; 8 m² for 6 m² with 1 m², 2 σ.
+        let Descriptor::Material(mut banner) = material(BANNER, 4.0, -0.2) else { panic!("a rectangle") };
+        banner.corners.iter_mut().for_each(|corner| corner.height_m += 0.4);
+        banner.sigma = Some(Uncertainty { position_m: 0.2, size_m: None, area_m2: Some(1.0) });
+        let found = score(&truth(ADDED), &[Change::Add(Descriptor::Material(banner))]).expected[0].found.unwrap();
+        assert!((found.position_off_m.unwrap() - 0.3).abs() < 1e-9);
+        assert!((found.position_sigmas.unwrap() - 2.5).abs() < 1e-9, "{found:?}");
+        assert!((found.area_sigmas.unwrap() - 2.0).abs() < 1e-9, "{found:?}");
+        let unsure = score(&truth(ADDED), &[Change::Add(material(BANNER, 4.0, 0.0))]).expected[0].found.unwrap();
+        assert_eq!((unsure.position_sigmas, unsure.area_sigmas), (None, None));
+    }
+
+    #[test]
+    fn what_is_replaced_is_modified_or_removed_and_added_and_never_there_twice() {
+        let truth = truth(REPLACED);
+        let (old, new) = (material(ClassId(2), 2.8, 0.1), material(BANNER, 3.0, 0.0));
+        let of = |changes: &[Change]| {
+            let score = score(&truth, changes);
+            assert!(score.expected[0].is_replacement);
+            (score.expected[0].found.map(|found| found.replacement.unwrap()), score.false_updates.len())
+        };
+        let removed = Change::Remove { fid: 3, before: old.clone() };
+        let modified = Change::Modify { fid: 3, before: old, after: new.clone() };
+        let elsewhere = Change::Remove { fid: 4, before: material(ClassId(2), 2.8, 30.0) };
+        assert_eq!(of(&[modified]), (Some(Replacement::InPlace), 0));
+        assert_eq!(of(&[Change::Add(new.clone()), removed.clone()]), (Some(Replacement::RemovedAndAdded), 0));
+        assert_eq!(of(&[Change::Add(new.clone())]), (Some(Replacement::Beside), 0));
+        assert_eq!(of(&[removed.clone()]), (None, 0));
+        assert_eq!(of(&[removed.clone(), removed]), (None, 1));
+        assert_eq!(of(&[Change::Add(new), elsewhere]), (Some(Replacement::Beside), 1));
+    }
+
+    #[test]
+    fn a_chair_that_moved_may_leave_its_old_place() {
+        let moved =
+            r#"{"op":"add","class":"chair","position":[11,10,0],"replaces":{"class":"chair","position":[10,10,0]}}"#;
+        let away = Change::Remove { fid: 7, before: chair(10.0, 10.0) };
+        let score = score(&truth(moved), &[away, Change::Add(chair(11.1, 10.0))]);
+        assert!(score.false_updates.is_empty());
+        assert_eq!(score.expected[0].found.unwrap().replacement, Some(Replacement::RemovedAndAdded));
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_no_change_and_any_update_of_it_is_false() {
+        let pose = r#"{"easting":0,"northing":0,"height":0,"yaw_deg":0,"pitch_deg":0,"roll_deg":0}"#;
+        let text = format!(r#"{{"pose":{pose},"scene":"street","changes":[],"unmeasurable":[{ADDED}]}}"#);
+        let truth: Truth = serde_json::from_str(&text).unwrap();
+        let score = score(&truth, &[Change::Add(material(BANNER, 3.0, 0.0))]);
+        assert!(score.expected.is_empty() && score.false_updates.len() == 1);
     }
 }

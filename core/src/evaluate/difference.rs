@@ -1,6 +1,7 @@
 //! Whether one matcher is better than another: both on the same captures, difference by difference.
 
 use super::bootstrap::{Bootstrap, Estimate};
+use super::change_difference::ChangeDifference;
 use super::pose_error::Level;
 use super::summary::Trial;
 use serde::Serialize;
@@ -19,6 +20,8 @@ pub struct Difference {
     /// Share of captures on which the answer is nearer to the truth in plan than the other's; ties, such as two captures
     /// without an answer, count half.
     pub nearer: Estimate,
+    /// What their updates differ in; `None` where none was run.
+    pub changes: Option<ChangeDifference>,
 }
 
 impl Difference {
@@ -47,6 +50,7 @@ impl Difference {
             recall_2m_2deg: recall_2m_2deg?,
             recall_5m_5deg: recall_5m_5deg?,
             nearer: nearer?,
+            changes: ChangeDifference::of(own, other, bootstrap),
         })
     }
 }

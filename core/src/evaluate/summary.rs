@@ -1,7 +1,8 @@
 //! One matcher over many captures, in numbers.
 
 use super::bootstrap::{Bootstrap, Estimate};
-use super::changes::{ChangeScore, ChangeSummary};
+use super::change_summary::ChangeSummary;
+use super::changes::ChangeScore;
 use super::nees::Consistency;
 use super::pose_error::{Level, PoseError};
 use super::statistics::{mean, median, quantile};
@@ -107,7 +108,6 @@ impl Summary {
         let [recall_1m_1deg, recall_2m_2deg, recall_5m_5deg] =
             Level::ALL.map(|level| measured.share(|trial| trial.is_within(level)));
         let within_2m = || trials.iter().filter(|trial| trial.position_m() <= 2.0);
-        let scores: Vec<&ChangeScore> = trials.iter().filter_map(|trial| trial.changes.as_ref()).collect();
         let seconds: Vec<f64> = trials.iter().map(|trial| trial.seconds).collect();
         Some(Self {
             captures: trials.len(),
@@ -127,7 +127,7 @@ impl Summary {
             nees: measured.consistency(|_| true),
             nees_reliable: measured.consistency(|answer| answer.is_reliable),
             median_seconds: median(&seconds)?,
-            changes: (!scores.is_empty()).then(|| ChangeSummary::of(&scores, bootstrap)),
+            changes: ChangeSummary::of(trials, bootstrap),
         })
     }
 }

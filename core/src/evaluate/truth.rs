@@ -50,6 +50,37 @@ pub struct TrueChange {
     /// Corners of a rectangle.
     #[serde(default)]
     pub corners: Option<[GridPoint; 4]>,
+    /// What the map knew in its place, or where it was before.
+    #[serde(default)]
+    pub replaces: Option<Replaced>,
+}
+
+/// A descriptor of the map that a true change stands for.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Replaced {
+    /// Its class.
+    pub class: String,
+    /// Centre of a rectangle, ground contact of an object.
+    #[serde(default)]
+    position: Option<GridPoint>,
+    /// Corners of a rectangle.
+    #[serde(default)]
+    corners: Option<[GridPoint; 4]>,
+}
+
+impl Replaced {
+    /// Its position, or the mean of its corners; a truth that was read has one of them.
+    pub fn place(&self) -> Option<GridPoint> {
+        let mean = |corners: &[GridPoint; 4], pick: fn(&GridPoint) -> f64| corners.iter().map(pick).sum::<f64>() / 4.0;
+        self.position.or_else(|| {
+            let corners = self.corners.as_ref()?;
+            Some(GridPoint::new(
+                mean(corners, |corner| corner.easting_m),
+                mean(corners, |corner| corner.northing_m),
+                mean(corners, |corner| corner.height_m),
+            ))
+        })
+    }
 }
 
 /// How far a capture is from ideal.
@@ -117,6 +148,9 @@ impl Truth {
             if change.op != Op::Modify && (change.class.is_none() || change.position.is_none()) {
                 return Err(format!("changes[{index}]: expected a class and a position"));
             }
+            if change.replaces.as_ref().is_some_and(|replaced| replaced.place().is_none()) {
+                return Err(format!("changes[{index}].replaces: expected a position or corners"));
+            }
         }
         Ok(truth)
     }
@@ -177,6 +211,8 @@ mod tests {
         assert!(parse(r#""scene":"../street""#).unwrap_err().contains("name of a directory"));
         let adrift = parse(r#""scene":"street","changes":[{"op":"add","class":"banner"}]"#).unwrap_err();
         assert_eq!(adrift, "changes[0]: expected a class and a position");
+        let nowhere = r#""scene":"street","changes":[{"op":"add","class":"chair","position":[1,2,3],"replaces":{"class":"chair"}}]"#;
+        assert_eq!(parse(nowhere).unwrap_err(), "changes[0].replaces: expected a position or corners");
         assert!(parse(r#""scene":"street","changes":[{"op":"paint"}]"#).is_err());
         assert!(Truth::parse(b"").is_err() && Truth::parse(b"[]").is_err());
     }
