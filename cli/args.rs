@@ -415,12 +415,17 @@ pub struct Eval {
     /// At most this many captures
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub limit: Option<u64>,
-    /// Change detector
-    #[arg(long, default_value = "class-difference", requires = "updates")]
-    pub detector: String,
-    /// Descriptor estimator
-    #[arg(long, default_value = "descriptors", requires = "updates")]
-    pub estimator: String,
+    /// A change detector with settings of its own, as --matcher has them; may be given again: every matcher is tried
+    /// with every detector and estimator
+    #[arg(long, value_name = "NAME[:KEY=VALUE,…]", default_value = "class-difference", requires = "updates")]
+    pub detector: Vec<String>,
+    /// A descriptor estimator, likewise
+    #[arg(long, value_name = "NAME[:KEY=VALUE,…]", default_value = "descriptors", requires = "updates")]
+    pub estimator: Vec<String>,
+    /// Captures at a time; more than one makes the seconds longer than they are alone [default: processors with
+    /// --updates, else 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
     #[command(flatten)]
     pub settings: Settings,
     /// Seed of the bootstrap that the 95 % intervals come from

@@ -6,8 +6,21 @@ use resurvey_core::evaluate::Truth;
 use std::path::{Path, PathBuf};
 
 const TRUTH: &str = "truth.json";
+const CAPTURE: &str = "capture.json";
+/// The directory of another photo within that of the first.
+const SECOND: &str = "second";
+
+/// Another photo of the same changed place.
+#[derive(Clone)]
+pub struct Second {
+    /// The capture.
+    pub capture: PathBuf,
+    /// What really was.
+    pub truth: Truth,
+}
 
 /// A directory with `capture.json` and `truth.json`.
+#[derive(Clone)]
 pub struct Case {
     /// The directory.
     pub directory: PathBuf,
@@ -17,12 +30,14 @@ pub struct Case {
     pub truth: Truth,
     /// The directory of its scene's model.
     pub scene: PathBuf,
+    /// The photo in `second`, where there is one.
+    pub second: Option<Second>,
 }
 
 impl Case {
     /// The capture.
     pub fn capture(&self) -> PathBuf {
-        self.directory.join("capture.json")
+        self.directory.join(CAPTURE)
     }
 
     /// The descriptors that the map had before, where it had any.
@@ -64,7 +79,11 @@ fn read(directory: PathBuf, name: String, maps: &[PathBuf]) -> Result<Case, Fail
             path.display()
         ))
     })?;
-    Ok(Case { directory, name, truth, scene })
+    let second = Some(directory.join(SECOND)).filter(|second| second.is_dir());
+    let second = second.map(|second| {
+        Ok::<_, Failure>(Second { capture: second.join(CAPTURE), truth: Truth::read(&second.join(TRUTH))? })
+    });
+    Ok(Case { second: second.transpose()?, directory, name, truth, scene })
 }
 
 /// The directories of captures that `given` is or holds, by name, and where their maps may be.

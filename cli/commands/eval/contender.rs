@@ -1,4 +1,4 @@
-//! Contenders: matchers with their settings, as `--matcher` names them.
+//! Contenders: matchers, detectors and estimators with their settings, as the options name them, in every combination.
 
 use crate::args::{Eval, PluginSearch, Settings};
 use crate::failure::Failure;
@@ -19,28 +19,38 @@ const DEFAULT: [(&str, &str); 7] = [
     ("semantic", "semantic"),
 ];
 
-/// A matcher with its settings.
-pub struct Contender {
+/// A plugin with its settings; that of a matcher is `None` for the prior.
+pub struct Entry<T> {
     /// Its name in tables and documents.
     pub name: String,
-    /// As `--matcher` has it.
+    /// As the option has it.
     pub specification: String,
-    /// The plugin; `None` for the prior.
-    pub matcher: Option<Tool>,
+    /// The plugin.
+    pub tool: T,
 }
 
-impl Contender {
-    fn identity(&self) -> Option<(&str, Digest)> {
-        self.matcher.as_ref().map(|tool| (tool.plugin.info().name.as_str(), tool.settings.sha256()))
-    }
+/// A matcher, a detector and an estimator, by their places in the field; without updates only the matcher counts.
+pub struct Contender {
+    /// Its name in tables and documents: the matcher's, and those of detector and estimator where there are several.
+    pub name: String,
+    /// Which matcher.
+    pub matcher: usize,
+    /// Which detector.
+    pub detector: usize,
+    /// Which estimator.
+    pub estimator: usize,
 }
 
 /// The plugins of a run, and the limits of its gate.
 pub struct Field {
-    /// Matchers, in the order of the tables.
+    /// Every combination, in the order of the tables: all of the first matcher first.
     pub contenders: Vec<Contender>,
-    /// Detector and estimator.
-    pub others: [Tool; 2],
+    /// Matchers.
+    pub matchers: Vec<Entry<Option<Tool>>>,
+    /// Detectors.
+    pub detectors: Vec<Entry<Tool>>,
+    /// Estimators.
+    pub estimators: Vec<Entry<Tool>>,
     /// The `--set` and `--profile` of all of them.
     pub settings: Settings,
     names: Vec<String>,
@@ -54,35 +64,83 @@ impl Field {
         let specifications: Vec<(&str, &str)> =
             if options.matcher.is_empty() { DEFAULT.to_vec() } else { given.collect() };
         let matchers = specifications.iter().map(|(_, text)| plugin_name(text)).filter(|name| *name != PRIOR);
-        let others = [options.detector.as_str(), options.estimator.as_str()];
+        let others = options.detector.iter().chain(&options.estimator).map(|text| plugin_name(text));
         let names: Vec<String> = matchers.chain(others).map(ToOwned::to_owned).collect();
         let settings = Settings { set: options.settings.set.clone(), profile: options.settings.profile.clone() };
-        let field = Reading { registry: &registry, settings: &settings, names: &names };
-        let contenders =
-            specifications.iter().map(|(name, text)| field.contender(name, text)).collect::<Result<_, _>>()?;
-        let [detector, estimator] = others.map(|name| field.tool(name, &[]));
-        let others = [detector?, estimator?];
+        let reading = Reading { registry: &registry, settings: &settings, names: &names };
+        let matchers = specifications.iter().map(|(name, text)| reading.matcher(name, text));
+        let matchers: Vec<_> = matchers.collect::<Result<_, _>>()?;
         // A plugin in the place of another kind is refused before the first capture.
-        others[0].plugin.detector(&others[0].settings)?;
-        others[1].plugin.estimator(&others[1].settings)?;
-        Ok(Self { contenders, others, settings, names })
+        let detectors = options
+            .detector
+            .iter()
+            .map(|text| reading.entry("--detector", text, |tool| Ok(drop(tool.plugin.detector(&tool.settings)?))));
+        let detectors: Vec<_> = detectors.collect::<Result<_, _>>()?;
+        let estimators = options
+            .estimator
+            .iter()
+            .map(|text| reading.entry("--estimator", text, |tool| Ok(drop(tool.plugin.estimator(&tool.settings)?))));
+        let estimators: Vec<_> = estimators.collect::<Result<_, _>>()?;
+        let contenders = combinations(&matchers, &detectors, &estimators);
+        Ok(Self { contenders, matchers, detectors, estimators, settings, names })
     }
 
-    /// Pairs of contenders that are the same plugin with the same complete settings, and so give the same answers.
+    /// The places of the contenders with this matcher.
+    pub fn with_matcher(&self, matcher: usize) -> impl Iterator<Item = &Contender> {
+        self.contenders.iter().filter(move |contender| contender.matcher == matcher)
+    }
+
+    /// Detector and estimator of `contender`.
+    pub fn comparers(&self, contender: &Contender) -> [&Tool; 2] {
+        [&self.detectors[contender.detector].tool, &self.estimators[contender.estimator].tool]
+    }
+
+    /// Whether `index` is the first contender with its matcher: the others have the same poses.
+    pub fn is_first_of_matcher(&self, index: usize) -> bool {
+        let matcher = |index: usize| self.contenders.get(index).map(|contender| contender.matcher);
+        index.checked_sub(1).is_none_or(|before| matcher(before) != matcher(index))
+    }
+
+    /// Pairs of contenders that are the same plugins with the same complete settings, and so give the same answers.
     pub fn twins(&self) -> Vec<[&str; 2]> {
         let pairs = self
             .contenders
             .iter()
             .enumerate()
             .flat_map(|(index, contender)| self.contenders[..index].iter().map(move |before| (before, contender)));
-        let same = pairs.filter(|(before, contender)| before.identity() == contender.identity());
+        let same = pairs.filter(|(before, contender)| self.identity(before) == self.identity(contender));
         same.map(|(before, contender)| [before.name.as_str(), contender.name.as_str()]).collect()
+    }
+
+    fn identity(&self, contender: &Contender) -> [Option<(&str, Digest)>; 3] {
+        let [detector, estimator] = self.comparers(contender).map(Some);
+        [self.matchers[contender.matcher].tool.as_ref(), detector, estimator]
+            .map(|tool| tool.map(|tool| (tool.plugin.info().name.as_str(), tool.settings.sha256())))
     }
 
     /// Limits of gate and search, and the settings of detector and estimator.
     pub fn choices(&self) -> Result<Choices, Failure> {
         choices(&self.settings, &self.names, &[])
     }
+}
+
+/// Every matcher with every detector with every estimator. A name says of the latter two only what differs.
+fn combinations<M, T>(matchers: &[Entry<M>], detectors: &[Entry<T>], estimators: &[Entry<T>]) -> Vec<Contender> {
+    let mut contenders = Vec::new();
+    for (matcher, with) in matchers.iter().enumerate() {
+        for (detector, and) in detectors.iter().enumerate() {
+            for (estimator, last) in estimators.iter().enumerate() {
+                let mut name = with.name.clone();
+                for (entry, count) in [(and, detectors.len()), (last, estimators.len())] {
+                    if count > 1 {
+                        name = format!("{name} + {}", entry.name);
+                    }
+                }
+                contenders.push(Contender { name, matcher, detector, estimator });
+            }
+        }
+    }
+    contenders
 }
 
 struct Reading<'a> {
@@ -92,25 +150,30 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn contender(&self, name: &str, text: &str) -> Result<Contender, Failure> {
-        let own = own_settings(text)?;
-        let matcher = if plugin_name(text) == PRIOR {
-            if !own.is_empty() {
+    fn matcher(&self, name: &str, text: &str) -> Result<Entry<Option<Tool>>, Failure> {
+        const OPTION: &str = "--matcher";
+        if plugin_name(text) == PRIOR {
+            if !own_settings(OPTION, text)?.is_empty() {
                 return Err(Failure::usage(format!("--matcher {text}: the prior has no settings")));
             }
-            None
-        } else {
-            let tool = self.tool(plugin_name(text), &own)?;
-            tool.plugin.matcher(&tool.settings)?;
-            Some(tool)
-        };
-        Ok(Contender { name: name.to_owned(), specification: text.to_owned(), matcher })
+            return Ok(Entry { name: name.to_owned(), specification: text.to_owned(), tool: None });
+        }
+        let entry = self.entry(OPTION, text, |tool| Ok(drop(tool.plugin.matcher(&tool.settings)?)))?;
+        Ok(Entry { name: name.to_owned(), specification: entry.specification, tool: Some(entry.tool) })
     }
 
-    /// The plugin called `name` with the settings of the run, overruled by `own`.
-    fn tool(&self, name: &str, own: &[String]) -> Result<Tool, Failure> {
-        let plugin = load(self.registry, name)?;
-        choices(self.settings, self.names, own)?.tool(&plugin)
+    /// The plugin that `text` names, with the settings of the run, overruled by its own; `check` refuses another kind.
+    fn entry(
+        &self,
+        option: &str,
+        text: &str,
+        check: impl Fn(&Tool) -> Result<(), Failure>,
+    ) -> Result<Entry<Tool>, Failure> {
+        let own = own_settings(option, text)?;
+        let plugin = load(self.registry, plugin_name(text))?;
+        let tool = choices(self.settings, self.names, &own)?.tool(&plugin)?;
+        check(&tool)?;
+        Ok(Entry { name: text.to_owned(), specification: text.to_owned(), tool })
     }
 }
 
@@ -125,12 +188,12 @@ fn plugin_name(specification: &str) -> &str {
 }
 
 /// The settings behind the colon as `--set` has them.
-fn own_settings(specification: &str) -> Result<Vec<String>, Failure> {
+fn own_settings(option: &str, specification: &str) -> Result<Vec<String>, Failure> {
     let Some((name, settings)) = specification.split_once(':') else { return Ok(Vec::new()) };
     let own = settings.split(',').map(|setting| match setting.split_once('=') {
         Some((key, _)) if !key.is_empty() => Ok(format!("{name}.{setting}")),
         _ => Err(Failure::usage(format!(
-            "--matcher {specification}: expected NAME:KEY=VALUE,… such as semantic:profile=paper,dice=1; found {setting:?}"
+            "{option} {specification}: expected NAME:KEY=VALUE,… such as semantic:profile=paper,dice=1; found {setting:?}"
         ))),
     });
     own.collect()
@@ -144,10 +207,28 @@ mod tests {
     fn a_specification_is_a_name_and_settings() {
         let text = "semantic:profile=paper,dice=1";
         assert_eq!(plugin_name(text), "semantic");
-        assert_eq!(own_settings(text).unwrap(), ["semantic.profile=paper", "semantic.dice=1"]);
-        assert!(own_settings("skyline").unwrap().is_empty());
+        assert_eq!(own_settings("--matcher", text).unwrap(), ["semantic.profile=paper", "semantic.dice=1"]);
+        assert!(own_settings("--matcher", "skyline").unwrap().is_empty());
         for wrong in ["semantic:", "semantic:dice", "semantic:=1", "semantic:dice=1,"] {
-            assert!(own_settings(wrong).unwrap_err().to_string().contains("NAME:KEY=VALUE"), "{wrong}");
+            assert!(own_settings("--matcher", wrong).unwrap_err().to_string().contains("NAME:KEY=VALUE"), "{wrong}");
         }
+    }
+
+    #[test]
+    fn every_matcher_meets_every_detector_and_names_say_what_differs() {
+        let entries = |names: &[&str]| -> Vec<Entry<()>> {
+            let entry = |name: &&str| Entry { name: (*name).to_owned(), specification: (*name).to_owned(), tool: () };
+            names.iter().map(entry).collect()
+        };
+        let names = |matchers: &[&str], detectors: &[&str], estimators: &[&str]| -> Vec<String> {
+            let all = combinations(&entries(matchers), &entries(detectors), &entries(estimators));
+            all.into_iter().map(|contender| contender.name).collect()
+        };
+        assert_eq!(names(&["prior", "semantic"], &["class-difference"], &["descriptors"]), ["prior", "semantic"]);
+        assert_eq!(
+            names(&["prior", "semantic"], &["plain", "aligned"], &["descriptors"]),
+            ["prior + plain", "prior + aligned", "semantic + plain", "semantic + aligned"]
+        );
+        assert_eq!(names(&["semantic"], &["plain"], &["a", "b"]), ["semantic + a", "semantic + b"]);
     }
 }

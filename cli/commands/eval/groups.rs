@@ -1,4 +1,4 @@
-//! Summaries of all captures, of each noise level and of each scene, and contender against contender.
+//! Summaries of all captures, of each noise level, scene and kind of change, and contender against contender.
 
 use super::attempt::Record;
 use super::contender::Contender;
@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 
 /// Some captures.
 pub struct Group {
-    /// `all`, `noise` or `scene`.
+    /// `all`, `noise`, `scene` or `kind`.
     pub by: &'static str,
-    /// Which noise level or scene; `all` for all.
+    /// Which noise level, scene or kind; `all` for all.
     pub name: String,
     /// One a contender, in their order.
     pub summaries: Vec<Summary>,
@@ -17,7 +17,7 @@ pub struct Group {
     pub differences: Vec<Difference>,
 }
 
-/// All captures first, then noise levels, then scenes.
+/// All captures first, then noise levels, then scenes, then kinds of change.
 pub fn groups(records: &[Record], contenders: &[Contender], bootstrap: &Bootstrap) -> Vec<Group> {
     let group = |by, name: &str, holds: &dyn Fn(&Record) -> bool| {
         let captures: Vec<&Record> = records.iter().filter(|record| holds(record)).collect();
@@ -40,5 +40,7 @@ pub fn groups(records: &[Record], contenders: &[Contender], bootstrap: &Bootstra
         .extend(levels.iter().map(|level| group("noise", level.name(), &|record| record.case.truth.noise() == *level)));
     let scenes: BTreeSet<&str> = records.iter().map(|record| record.case.truth.scene.as_str()).collect();
     groups.extend(scenes.iter().map(|scene| group("scene", scene, &|record| record.case.truth.scene == *scene)));
+    let kinds: BTreeSet<&str> = records.iter().map(|record| record.case.truth.kind.as_str()).collect();
+    groups.extend(kinds.iter().map(|kind| group("kind", kind, &|record| record.case.truth.kind == *kind)));
     groups
 }

@@ -11,6 +11,7 @@ use resurvey_schema::{ClassTable, GridPoint};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 
 /// Where temporary maps come from.
@@ -18,6 +19,8 @@ pub struct Maps {
     directory: TempDir,
     /// Map file by directory of the scene.
     scenes: BTreeMap<PathBuf, PathBuf>,
+    /// Copies so far, each with a name of its own.
+    copies: AtomicUsize,
 }
 
 #[derive(Deserialize)]
@@ -30,29 +33,56 @@ impl Maps {
     pub fn new() -> Result<Self, Failure> {
         let directory = tempfile::tempdir()
             .map_err(|error| Failure::new(INTERNAL, anyhow::anyhow!("a temporary directory: {error}")))?;
-        Ok(Self { directory, scenes: BTreeMap::new() })
+        Ok(Self { directory, scenes: BTreeMap::new(), copies: AtomicUsize::new(0) })
     }
 
-    /// The map of `scene`, built when it is first asked for.
-    pub fn of_scene(&mut self, scene: &Path) -> Result<PathBuf, Failure> {
-        if let Some(path) = self.scenes.get(scene) {
-            return Ok(path.clone());
+    /// Builds the map of `scene`, unless it is there.
+    pub fn prepare(&mut self, scene: &Path) -> Result<(), Failure> {
+        if !self.scenes.contains_key(scene) {
+            let path = self.directory.path().join(format!("scene-{}.rsv", self.scenes.len()));
+            build(scene, &path)?;
+            self.scenes.insert(scene.to_owned(), path);
         }
-        let path = self.directory.path().join(format!("scene-{}.rsv", self.scenes.len()));
-        build(scene, &path)?;
-        self.scenes.insert(scene.to_owned(), path.clone());
-        Ok(path)
+        Ok(())
     }
 
-    /// A copy of `map` in place of the last copy of this name.
-    pub fn copy(&self, map: &Path, name: &str) -> Result<PathBuf, Failure> {
-        let path = self.directory.path().join(format!("{name}.rsv"));
-        for suffix in ["", "-wal", "-shm"] {
-            // What is not there need not go.
-            let _ = std::fs::remove_file(self.directory.path().join(format!("{name}.rsv{suffix}")));
-        }
+    /// A copy of the map of `scene`, which was prepared.
+    pub fn of_scene(&self, scene: &Path) -> Result<Copy, Failure> {
+        let path = self.scenes.get(scene).ok_or_else(|| {
+            Failure::new(INTERNAL, anyhow::anyhow!("{}: expected a map that was prepared", scene.display()))
+        })?;
+        self.copy(path)
+    }
+
+    /// A copy of `map` of its own, which goes when it is dropped.
+    pub fn copy(&self, map: &Path) -> Result<Copy, Failure> {
+        let number = self.copies.fetch_add(1, Ordering::Relaxed);
+        let path = self.directory.path().join(format!("copy-{number}.rsv"));
         std::fs::copy(map, &path).map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
-        Ok(path)
+        Ok(Copy { path })
+    }
+}
+
+/// A map that may be changed.
+pub struct Copy {
+    path: PathBuf,
+}
+
+impl Copy {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for Copy {
+    fn drop(&mut self) {
+        for suffix in ["", "-wal", "-shm"] {
+            let mut name = self.path.clone().into_os_string();
+            name.push(suffix);
+            // What is not there need not go; what stays goes with the directory.
+            let _ = std::fs::remove_file(name);
+        }
     }
 }
 

@@ -1,10 +1,12 @@
 //! The run: every contender on every capture, then the tables.
 
-use super::attempt::{Portion, Record, Runner};
+use super::attempt::{Record, Runner};
 use super::cases::{self, Case};
 use super::contender::Field;
 use super::groups::groups;
 use super::maps::{Maps, check};
+use super::parallel::in_order;
+use super::progress::{Portion, Progress};
 use super::{csv, document, table_v, text};
 use crate::args::{Eval, Experiment, PluginSearch};
 use crate::commands::write_file;
@@ -22,6 +24,8 @@ pub struct Results<'a> {
     pub bootstrap: Bootstrap,
     /// Processors that the seconds were measured on.
     pub cores: usize,
+    /// Captures that were worked on at a time.
+    pub jobs: usize,
     /// Whether updates were run.
     pub with_updates: bool,
 }
@@ -39,7 +43,7 @@ pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) ->
     let mut maps = Maps::new()?;
     // Whatever is wrong with a file is said before hours are spent on the others.
     for case in &cases {
-        maps.of_scene(&case.scene)?;
+        maps.prepare(&case.scene)?;
         if let Some(changes) = case.base_changes() {
             check(&changes)?;
         }
@@ -47,11 +51,17 @@ pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) ->
     if let Some(path) = &options.csv {
         write_file(path, b"")?;
     }
-    let mut runner = Runner::new(&field, maps, options.updates)?;
-    let records = records(&mut runner, cases, console)?;
-    let bootstrap = Bootstrap { seed: options.seed, ..Bootstrap::default() };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let results = Results { field: &field, records: &records, bootstrap, cores, with_updates: options.updates };
+    let jobs = match options.jobs {
+        Some(jobs) => usize::from(jobs),
+        // Times are compared where only poses are; there a capture has the machine to itself.
+        None if options.updates => cores,
+        None => 1,
+    };
+    let runner = Runner::new(&field, maps, options.updates)?;
+    let records = records(&runner, &cases, jobs, console)?;
+    let bootstrap = Bootstrap { seed: options.seed, ..Bootstrap::default() };
+    let results = Results { field: &field, records: &records, bootstrap, cores, jobs, with_updates: options.updates };
     let groups = groups(&records, &field.contenders, &bootstrap);
     if let Some(path) = &options.csv {
         write_file(path, csv::csv(&results).as_bytes())?;
@@ -64,14 +74,21 @@ pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) ->
     Ok(0)
 }
 
-fn records(runner: &mut Runner<'_>, cases: Vec<Case>, console: &mut Console<'_>) -> Result<Vec<Record>, Failure> {
-    let share = 1.0 / cases.len() as f64;
+fn records(
+    runner: &Runner<'_>,
+    cases: &[Case],
+    jobs: usize,
+    console: &mut Console<'_>,
+) -> Result<Vec<Record>, Failure> {
     let stage = console.stage("evaluate");
-    let mut records = Vec::with_capacity(cases.len());
-    for (index, case) in cases.into_iter().enumerate() {
-        let portion = Portion { stage: &stage, start: share * index as f64, share, place: case.name.clone() };
-        records.push(runner.record(case, &portion)?);
-    }
+    let progress = Progress::new(cases.len());
+    let records = in_order(cases.len(), jobs, |index| {
+        let case = &cases[index];
+        let place = case.name.clone();
+        let whole = Portion { progress: &progress, stage: &stage, capture: index, start: 0.0, share: 1.0, place };
+        runner.record(case, &whole)
+    });
+    progress.tell(&stage);
     console.finish(&stage);
-    Ok(records)
+    records
 }

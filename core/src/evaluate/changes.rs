@@ -70,6 +70,17 @@ pub enum Replacement {
     Beside,
 }
 
+impl Replacement {
+    /// Its name in tables and documents.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InPlace => "in-place",
+            Self::RemovedAndAdded => "removed-and-added",
+            Self::Beside => "beside",
+        }
+    }
+}
+
 /// A change that never happened.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FalseUpdate {
