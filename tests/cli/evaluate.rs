@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use tempfile::TempDir;
 
 /// A search that is quick, around the prior of captures whose prior was put 3 m and 4° off.
-const QUICK: &str = "semantic:radius_m=5,yaw_range_deg=8,modes=4";
+pub const QUICK: &str = "semantic:radius_m=5,yaw_range_deg=8,modes=4";
 
 /// Two captures: the street's new banner, and a hall that lost a chair the map knew.
 pub fn suite() -> &'static Path {
@@ -38,7 +38,7 @@ pub fn suite() -> &'static Path {
 }
 
 /// A copy of the suite that a test may change.
-fn copy() -> TempDir {
+pub fn copy() -> TempDir {
     let directory = tempfile::tempdir().unwrap();
     for (path, bytes) in files(suite()) {
         let path = directory.path().join(path);
@@ -66,23 +66,23 @@ fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 /// Changes a JSON file.
-fn edit(path: &Path, change: impl FnOnce(&mut Value)) {
+pub fn edit(path: &Path, change: impl FnOnce(&mut Value)) {
     let mut document: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     change(&mut document);
     std::fs::write(path, document.to_string()).unwrap();
 }
 
-fn eval(cases: &Path, arguments: &[&str]) -> Run {
+pub fn eval(cases: &Path, arguments: &[&str]) -> Run {
     let words: Vec<&str> = ["eval", text(cases)].into_iter().chain(arguments.iter().copied()).collect();
     resurvey(&words)
 }
 
-fn number(value: &Value) -> f64 {
+pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("expected a number, found {value}"))
 }
 
 /// The answer of matcher `index` on the capture called `name`.
-fn answer<'a>(document: &'a Value, name: &str, index: usize) -> &'a Value {
+pub fn answer<'a>(document: &'a Value, name: &str, index: usize) -> &'a Value {
     let captures = document["captures"].as_array().unwrap();
     let capture = captures.iter().find(|capture| capture["capture"] == name).unwrap();
     &capture["answers"][index]
@@ -130,7 +130,7 @@ fn poses_and_changes_are_those_of_update_and_errors_those_of_the_truth() {
 fn check_summaries(document: &Value) {
     let groups = document["groups"].as_array().unwrap();
     let names: Vec<&str> = groups.iter().map(|group| group["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["all", "ideal", "light", "hall", "street"]);
+    assert_eq!(names, ["all", "ideal", "light", "hall", "street", "banner", "chair_removed"]);
     let [prior, semantic] = [0, 1].map(|index| &groups[0]["summaries"][index]);
     assert_eq!((&prior["captures"], &prior["recall_2m_2deg"]["value"]), (&json!(2), &json!(0.0)));
     assert_eq!((&prior["recall_5m_5deg"]["value"], &prior["coverage"]["value"]), (&json!(1.0), &json!(0.0)));
@@ -140,6 +140,14 @@ fn check_summaries(document: &Value) {
     assert_eq!(semantic["changes"]["material"], json!({ "found": 1, "expected": 1 }));
     assert_eq!(semantic["changes"]["dynamic"], json!({ "found": 1, "expected": 1 }));
     assert_eq!(semantic["changes"]["not_idempotent"], 0);
+    assert_eq!(semantic["changes"]["material_added"], json!({ "found": 1, "expected": 1 }));
+    assert_eq!(semantic["changes"]["dynamic_removed"], json!({ "found": 1, "expected": 1 }));
+    assert_eq!(
+        (&semantic["changes"]["missed"], &prior["changes"]["missed"]),
+        (&json!({}), &json!({"pose-not-reliable": 2}))
+    );
+    assert_eq!(semantic["changes"]["false_of_committed"]["of"], 2);
+    assert_eq!(semantic["changes"]["position_within_2_sigma"]["of"], 1);
     let difference = &groups[0]["differences"][0];
     assert_eq!((&difference["matcher"], &groups[0]["above"]), (&json!("prior"), &json!(QUICK)));
     assert_eq!((&difference["nearer"]["value"], &difference["recall_1m_1deg"]["value"]), (&json!(0.0), &json!(-1.0)));
@@ -273,6 +281,10 @@ fn matchers_and_settings_that_cannot_be_are_refused_with_what_can() {
     refused(&["--set", "magic.luck=1"], 2, &["does not use \"magic\""]);
     refused(&["--limit", "0"], 2, &["--limit"]);
     refused(&["--detector", "class-difference"], 2, &["--updates"]);
+    refused(&["--updates", "--detector", "class-difference:luck"], 2, &["--detector", "NAME:KEY=VALUE"]);
+    refused(&["--updates", "--estimator", "descriptors:luck=1"], 2, &["luck", "known are"]);
+    refused(&["--updates", "--detector", "descriptors"], 12, &["descriptors", "detector"]);
+    refused(&["--jobs", "0"], 2, &["--jobs"]);
     refused(&["--csv", text(&street().path("plain.rsv")), "--matcher", "prior"], 10, &["found a map"]);
     resurvey(&["eval"]).refused(2, &["<CASES>"]);
 }

@@ -11,6 +11,7 @@ mod change_sets;
 mod conflicts;
 mod differences;
 mod evaluate;
+mod evaluate_updates;
 mod exports;
 mod forgetting;
 mod generated;

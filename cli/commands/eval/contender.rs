@@ -70,22 +70,23 @@ impl Field {
         let reading = Reading { registry: &registry, settings: &settings, names: &names };
         let matchers = specifications.iter().map(|(name, text)| reading.matcher(name, text));
         let matchers: Vec<_> = matchers.collect::<Result<_, _>>()?;
+        let entries = |option: &str, texts: &[String]| -> Result<Vec<Entry<Tool>>, Failure> {
+            texts.iter().map(|text| reading.entry(option, text)).collect()
+        };
+        let detectors = entries("--detector", &options.detector)?;
+        let estimators = entries("--estimator", &options.estimator)?;
         // A plugin in the place of another kind is refused before the first capture.
-        let detectors = options
-            .detector
-            .iter()
-            .map(|text| reading.entry("--detector", text, |tool| Ok(drop(tool.plugin.detector(&tool.settings)?))));
-        let detectors: Vec<_> = detectors.collect::<Result<_, _>>()?;
-        let estimators = options
-            .estimator
-            .iter()
-            .map(|text| reading.entry("--estimator", text, |tool| Ok(drop(tool.plugin.estimator(&tool.settings)?))));
-        let estimators: Vec<_> = estimators.collect::<Result<_, _>>()?;
+        for Entry { tool, .. } in &detectors {
+            tool.plugin.detector(&tool.settings)?;
+        }
+        for Entry { tool, .. } in &estimators {
+            tool.plugin.estimator(&tool.settings)?;
+        }
         let contenders = combinations(&matchers, &detectors, &estimators);
         Ok(Self { contenders, matchers, detectors, estimators, settings, names })
     }
 
-    /// The places of the contenders with this matcher.
+    /// The contenders with this matcher.
     pub fn with_matcher(&self, matcher: usize) -> impl Iterator<Item = &Contender> {
         self.contenders.iter().filter(move |contender| contender.matcher == matcher)
     }
@@ -158,21 +159,16 @@ impl Reading<'_> {
             }
             return Ok(Entry { name: name.to_owned(), specification: text.to_owned(), tool: None });
         }
-        let entry = self.entry(OPTION, text, |tool| Ok(drop(tool.plugin.matcher(&tool.settings)?)))?;
+        let entry = self.entry(OPTION, text)?;
+        entry.tool.plugin.matcher(&entry.tool.settings)?;
         Ok(Entry { name: name.to_owned(), specification: entry.specification, tool: Some(entry.tool) })
     }
 
-    /// The plugin that `text` names, with the settings of the run, overruled by its own; `check` refuses another kind.
-    fn entry(
-        &self,
-        option: &str,
-        text: &str,
-        check: impl Fn(&Tool) -> Result<(), Failure>,
-    ) -> Result<Entry<Tool>, Failure> {
+    /// The plugin that `text` names, with the settings of the run, overruled by its own.
+    fn entry(&self, option: &str, text: &str) -> Result<Entry<Tool>, Failure> {
         let own = own_settings(option, text)?;
         let plugin = load(self.registry, plugin_name(text))?;
         let tool = choices(self.settings, self.names, &own)?.tool(&plugin)?;
-        check(&tool)?;
         Ok(Entry { name: text.to_owned(), specification: text.to_owned(), tool })
     }
 }

@@ -60,7 +60,7 @@ mod tests {
         for jobs in [1, 3, 64] {
             assert_eq!(in_order(8, jobs, slow_at_first).unwrap(), [0, 1, 4, 9, 16, 25, 36, 49], "{jobs} jobs");
         }
-        assert!(in_order(0, 4, |index| Ok(index)).unwrap().is_empty());
+        assert!(in_order(0, 4, Ok).unwrap().is_empty());
     }
 
     #[test]

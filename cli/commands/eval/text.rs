@@ -20,26 +20,22 @@ pub fn print(
     if is_by_capture {
         titled("every capture (Table II of Lee & Hsu): position m / heading °", &captures(results), console)?;
     }
-    for group in groups.iter().filter(|group| is_worth_a_table(group, groups)) {
+    let worth_it: Vec<&Group> = groups.iter().filter(|group| is_worth_a_table(group, groups)).collect();
+    for group in &worth_it {
         let count = group.summaries.first().map_or(0, |summary| summary.captures);
-        let what = match (group.by, group.name.as_str()) {
-            ("all", _) => "all captures".to_owned(),
-            (by, "") => format!("no {by}"),
-            (by, name) => format!("{by} {name}"),
-        };
+        let is_of_all = group.by == "all";
+        let what = if is_of_all { "all captures".to_owned() } else { format!("{} {}", group.by, group.name) };
         // What changed is nothing to a pose.
         if group.by != "kind" {
             titled(&format!("{what}: {count}"), &accuracy(&group.summaries, results.field), console)?;
         }
-        if group.by == "all" {
+        if is_of_all {
             titled("reliability", &reliability(&group.summaries, results.field), console)?;
-        }
-        if results.with_updates {
-            updates(&format!("{what}: {count}: changes"), group, results, console)?;
-        }
-        if group.by == "all" {
             against_the_last(group, results, console)?;
         }
+    }
+    if results.with_updates {
+        updates(&worth_it, results, console)?;
     }
     notes(results, console)?;
     for index in 0..results.field.contenders.len() {
@@ -48,31 +44,39 @@ pub fn print(
     Ok(())
 }
 
-fn updates(title: &str, group: &Group, results: &Results<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
-    let (summaries, contenders) = (&group.summaries, &results.field.contenders);
-    titled(title, &update_tables::found(summaries, contenders), console)?;
-    titled("false, and changed again", &update_tables::false_updates(summaries, contenders), console)?;
-    titled("as placed", &update_tables::placed(summaries, contenders), console)?;
-    for (summary, contender) in summaries.iter().zip(contenders) {
-        if let Some(why) = summary.changes.as_ref().and_then(update_tables::why_missed) {
-            console.line(format_args!("why missed: {}: {why}", contender.name))?;
+fn updates(groups: &[&Group], results: &Results<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
+    let contenders = &results.field.contenders;
+    for group in groups.iter().filter(|group| group.by == "all") {
+        let summaries = &group.summaries;
+        titled("changes found, of those that can be seen", &update_tables::found(summaries, contenders), console)?;
+        for (summary, contender) in summaries.iter().zip(contenders) {
+            if let Some(why) = summary.changes.as_ref().and_then(update_tables::why_missed) {
+                console.line(format_args!("why missed: {}: {why}", contender.name))?;
+                console.line("")?;
+            }
+        }
+        titled("false, and changed again", &update_tables::false_updates(summaries, contenders), console)?;
+        titled("as placed", &update_tables::placed(summaries, contenders), console)?;
+        if let Some(last) = contenders.last().filter(|_| !group.differences.is_empty()) {
+            let table = update_tables::differences(&group.differences, contenders);
+            titled(&format!("changes: each against {} on the same captures", last.name), &table, console)?;
         }
     }
-    console.line("")
+    for by in ["noise", "scene", "kind"] {
+        let of_it: Vec<&Group> = groups.iter().copied().filter(|group| group.by == by).collect();
+        if !of_it.is_empty() {
+            titled(&format!("changes by {by}"), &update_tables::by_group(&of_it, contenders), console)?;
+        }
+    }
+    Ok(())
 }
 
 fn against_the_last(group: &Group, results: &Results<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
     let field = results.field;
-    let Some(last) = field.contenders.last().filter(|_| !group.differences.is_empty()) else { return Ok(()) };
-    if field.matchers.len() > 1 {
-        let name = &field.matchers[last.matcher].name;
-        titled(&format!("each against {name} on the same captures"), &differences(&group.differences, field), console)?;
-    }
-    if results.with_updates {
-        let table = update_tables::differences(&group.differences, &field.contenders);
-        titled(&format!("changes: each against {} on the same captures", last.name), &table, console)?;
-    }
-    Ok(())
+    let last = field.contenders.last().filter(|_| field.matchers.len() > 1 && !group.differences.is_empty());
+    let Some(last) = last else { return Ok(()) };
+    let title = format!("each against {} on the same captures", field.matchers[last.matcher].name);
+    titled(&title, &differences(&group.differences, field), console)
 }
 
 /// One noise level or one scene alone is all captures again.

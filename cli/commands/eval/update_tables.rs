@@ -2,6 +2,7 @@
 
 use super::cells::{dash, number, per_cent, points, share, signed, spread, table, tally};
 use super::contender::Contender;
+use super::groups::Group;
 use comfy_table::Table;
 use resurvey_core::evaluate::{ChangeSummary, Difference, SecondPhotos, Summary};
 
@@ -97,6 +98,48 @@ pub fn placed(summaries: &[Summary], contenders: &[Contender]) -> Table {
             share(changes.position_within_2_sigma.as_ref()),
             share(changes.area_within_2_sigma.as_ref()),
         ]);
+    }
+    table
+}
+
+/// The chief numbers of each of `groups`, a row for each contender in each.
+pub fn by_group(groups: &[&Group], contenders: &[Contender]) -> Table {
+    let by = groups.first().map_or("", |group| group.by);
+    let mut table = table(&[
+        by,
+        "contender",
+        "captures",
+        "material found",
+        "dynamic found",
+        "false of made",
+        "captures without change: false in %",
+        "off m: median / worst",
+        "area %: median / worst",
+        "replaced in place",
+        "changed twice",
+        "second photos changed again",
+        "missed",
+    ]);
+    for group in groups {
+        let count = group.summaries.first().map_or(0, |summary| summary.captures);
+        for (changes, name) in of_each(&group.summaries, contenders) {
+            let again = changes.second_photos.map(|photos| format!("{} of {}", photos.changed_again, photos.photos));
+            table.add_row([
+                if group.name.is_empty() { dash() } else { group.name.clone() },
+                name.to_owned(),
+                count.to_string(),
+                tally(changes.material),
+                tally(changes.dynamic),
+                format!("{} of {}", changes.false_updates, changes.committed),
+                share(changes.false_captures_without_change.as_ref()),
+                spread(changes.position_off_m.as_ref(), 2),
+                spread(changes.area_error_pct.as_ref(), 1),
+                tally(changes.replaced_in_place),
+                changes.not_idempotent.to_string(),
+                again.unwrap_or_else(dash),
+                why_missed(changes).unwrap_or_else(dash),
+            ]);
+        }
     }
     table
 }

@@ -345,7 +345,7 @@ pub(super) mod tests {
         assert_eq!(of(&[modified]), (Some(Replacement::InPlace), 0));
         assert_eq!(of(&[Change::Add(new.clone()), removed.clone()]), (Some(Replacement::RemovedAndAdded), 0));
         assert_eq!(of(&[Change::Add(new.clone())]), (Some(Replacement::Beside), 0));
-        assert_eq!(of(&[removed.clone()]), (None, 0));
+        assert_eq!(of(std::slice::from_ref(&removed)), (None, 0));
         assert_eq!(of(&[removed.clone(), removed]), (None, 1));
         assert_eq!(of(&[Change::Add(new), elsewhere]), (Some(Replacement::Beside), 1));
     }
