@@ -3,7 +3,7 @@
 use crate::position::Pose;
 use serde::{Deserialize, Serialize};
 
-/// The second-best place, more than 5 m from the best.
+/// The second-best place, where the matcher tells the two apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunnerUp {
     /// Distance in plan from the best pose, metres.

@@ -9,8 +9,10 @@ use resurvey_plugin::schema::{Alignment, Pose, RunnerUp};
 /// Over easting (m), northing (m) and yaw (rad).
 pub type Covariance = [[f64; 3]; 3];
 
-/// Modes closer than this are the same answer, metres.
-pub const SAME_PLACE_M: f64 = 5.0;
+/// Modes closer than this are the same answer, metres: windows and columns of a façade repeat every three to five.
+pub const SAME_PLACE_M: f64 = 2.5;
+/// An answer that nothing bounds is at least this unsure, metres.
+const UNBOUNDED_M: f64 = 5.0;
 /// Poses drawn around the best in each round.
 const SAMPLES: usize = 192;
 /// Half-widths of the box that poses are drawn from, in the first round: metres and radians.
@@ -68,13 +70,13 @@ pub fn in_plan(alignment: &Alignment) -> Covariance {
 
 /// `covariance` of an answer that no search around it bounds: at least 5 m, or the radius searched.
 pub fn unbounded(mut covariance: Covariance, searched_m: f64) -> Covariance {
-    let unsure_m2 = searched_m.max(SAME_PLACE_M).powi(2);
+    let unsure_m2 = searched_m.max(UNBOUNDED_M).powi(2);
     covariance[0][0] += unsure_m2;
     covariance[1][1] += unsure_m2;
     covariance
 }
 
-/// The best mode more than 5 m from the first; `modes` are sorted best first.
+/// The best mode more than 2.5 m from the first; `modes` are sorted best first.
 pub fn runner_up(modes: &[Mode], settings: &Settings) -> Option<RunnerUp> {
     let best = modes.first()?;
     let distance_m = |mode: &Mode| mode.pose.position.plan_distance_m(&best.pose.position);
