@@ -3,6 +3,7 @@
 use super::overlap::Overlap;
 use resurvey_schema::{
     ChangeRegion, ClassId, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Proposal, Rejection,
+    Uncertainty,
 };
 
 /// Reach of a removal, metres, where three times its 1σ is less: Lee & Hsu's Algorithm 2 has none and would take a
@@ -12,12 +13,23 @@ const REMOVAL_REACH_M: f64 = 3.0;
 const SAME_OVER_UNION: f64 = 0.5;
 /// A rectangle that covers this share of a smaller one replaces it.
 const COVERS_OVER_SMALLER: f64 = 0.6;
-/// Corners that moved less than this did not move, metres: the edge of a label is no sharper.
-const SAME_CORNER_M: f64 = 0.5;
-/// The same in shares of the rectangle's diagonal, for large ones.
-const SAME_CORNER_SHARE: f64 = 0.1;
+/// A rectangle whose centre moved by less did not move, metres: the edge of a label is no sharper.
+const SAME_CENTRE_M: f64 = 0.5;
+/// One whose sides changed by less did not grow, metres.
+const SAME_SIDE_M: f64 = 0.3;
+/// Both in shares of the rectangle's diagonal, for large ones.
+const SAME_SHARE: f64 = 0.1;
+/// Both in 1σ of the difference, where measurements say how sure they are.
+const SAME_SIGMAS: f64 = 3.0;
 /// Share of the smaller footprint side within which two objects of one class are the same.
 const SAME_OBJECT_SHARE: f64 = 1.0;
+
+/// An object that is gone and one of its class that is new within this distance are one that was moved, metres.
+const MOVE_REACH_M: f64 = 2.5;
+/// One that moved by less stayed, metres: 1 m of range is 4 px at 10 m.
+const LEAST_MOVE_M: f64 = 0.25;
+/// The same in 1σ of the difference.
+const MOVE_SIGMAS: f64 = 2.0;
 
 /// One change of the map.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,9 +67,10 @@ pub struct Resolution {
 /// most once.
 pub fn resolve(proposals: Vec<Proposal>, regions: &[ChangeRegion], descriptors: &[(u64, Descriptor)]) -> Resolution {
     let mut resolver = Resolver { regions, descriptors, taken: Vec::new(), resolution: Resolution::default() };
-    let mut removals = Vec::new();
+    let (mut removals, mut objects) = (Vec::new(), Vec::new());
     for proposal in proposals {
         match proposal {
+            Proposal::Place { region, descriptor: Descriptor::Dynamic(object) } => objects.push((region, object)),
             Proposal::Place { region, descriptor } => resolver.place(region, descriptor),
             Proposal::Remove { region, class, near, sigma_m } => {
                 removals.push(Removal { region, class, near, sigma_m });
@@ -65,7 +78,12 @@ pub fn resolve(proposals: Vec<Proposal>, regions: &[ChangeRegion], descriptors: 
             Proposal::Reject { rejection, .. } => resolver.resolution.rejections.push(rejection),
         }
     }
-    resolver.remove(&removals);
+    // What replaces a descriptor is known by now; a chair that is gone here and seen a metre away was moved.
+    let gone = resolver.gone(&removals);
+    let stayed = resolver.move_or_place(objects, gone);
+    for (fid, before) in stayed {
+        resolver.resolution.changes.push(Change::Remove { fid, before });
+    }
     resolver.resolution
 }
 
@@ -118,8 +136,8 @@ impl Resolver<'_> {
         self.resolution.changes.push(Change::Add(descriptor));
     }
 
-    /// Nearest pairs first, one removal to one descriptor.
-    fn remove(&mut self, removals: &[Removal]) {
+    /// The descriptors that `removals` speak of: nearest pairs first, one removal to one descriptor.
+    fn gone(&mut self, removals: &[Removal]) -> Vec<(u64, Descriptor)> {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (index, removal) in removals.iter().enumerate() {
             let reach_m = reach_m(removal);
@@ -132,12 +150,13 @@ impl Resolver<'_> {
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         let mut served = vec![false; removals.len()];
+        let mut gone = Vec::new();
         for (_, index, position) in pairs {
             let (fid, present) = &self.descriptors[position];
             if !served[index] && !self.taken.contains(fid) {
                 served[index] = true;
                 self.taken.push(*fid);
-                self.resolution.changes.push(Change::Remove { fid: *fid, before: present.clone() });
+                gone.push((*fid, present.clone()));
             }
         }
         for (removal, _) in removals.iter().zip(&served).filter(|(_, served)| !**served) {
@@ -153,6 +172,49 @@ impl Resolver<'_> {
                 "m",
             );
         }
+        gone
+    }
+
+    /// Places `objects`, those within reach of a `gone` one of their class as its new place, nearest pairs first; returns
+    /// what is gone for good.
+    fn move_or_place(
+        &mut self,
+        objects: Vec<(u32, DynamicDescriptor)>,
+        mut gone: Vec<(u64, Descriptor)>,
+    ) -> Vec<(u64, Descriptor)> {
+        let moved_m = |object: &DynamicDescriptor, before: &Descriptor| {
+            let distance_m = distance_m(object.position, before.anchor());
+            (before.class() == object.class && distance_m <= MOVE_REACH_M).then_some(distance_m)
+        };
+        let mut objects: Vec<Option<(u32, DynamicDescriptor)>> = objects.into_iter().map(Some).collect();
+        loop {
+            let mut nearest: Option<(f64, usize, usize)> = None;
+            for (index, (_, object)) in
+                objects.iter().enumerate().filter_map(|(at, object)| Some((at, object.as_ref()?)))
+            {
+                for (at, (_, before)) in gone.iter().enumerate() {
+                    let is_nearer = |moved_m: &f64| nearest.is_none_or(|(least_m, ..)| *moved_m < least_m);
+                    if let Some(moved_m) = moved_m(object, before).filter(is_nearer) {
+                        nearest = Some((moved_m, index, at));
+                    }
+                }
+            }
+            let Some((moved_m, index, at)) = nearest else { break };
+            let (Some((region, object)), (fid, before)) = (objects[index].take(), gone.swap_remove(at)) else { break };
+            let sigma_m = |sigma: Option<Uncertainty>| sigma.map_or(0.0, |sigma| sigma.position_m);
+            let limit_m = MOVE_SIGMAS * sigma_m(object.sigma).hypot(sigma_m(before.sigma()));
+            let limit_m = limit_m.clamp(LEAST_MOVE_M, SAME_OBJECT_SHARE * object.size_m[0].min(object.size_m[1]));
+            if moved_m > limit_m {
+                let after = Descriptor::Dynamic(object);
+                self.resolution.changes.push(Change::Modify { fid, before, after });
+            } else {
+                self.reject(region, "already-on-map", moved_m, limit_m, "m");
+            }
+        }
+        for (region, object) in objects.into_iter().flatten() {
+            self.place(region, Descriptor::Dynamic(object));
+        }
+        gone
     }
 
     fn reject(&mut self, region: u32, requirement: &str, measured: f64, limit: f64, unit: &str) {
@@ -190,14 +252,27 @@ fn material_relation(present: &MaterialDescriptor, measured: &MaterialDescriptor
     if overlap.over_union() < SAME_OVER_UNION && overlap.over_smaller() < COVERS_OVER_SMALLER {
         return Relation::Unrelated;
     }
-    let corners = || present.corners.iter().zip(&measured.corners);
-    let moved_m = corners().map(|(a, b)| distance_m(*a, *b)).fold(0.0, f64::max);
-    let diagonal_m = distance_m(present.corners[0], present.corners[2]);
-    let limit_m = SAME_CORNER_M.max(SAME_CORNER_SHARE * diagonal_m);
-    if present.class == measured.class && moved_m <= limit_m {
-        return Relation::Same { moved_m, limit_m };
+    if present.class != measured.class {
+        return Relation::Replaces;
     }
-    Relation::Replaces
+    let sigma_m = |of: fn(&Uncertainty) -> Option<f64>| {
+        let one = |descriptor: &MaterialDescriptor| descriptor.sigma.as_ref().and_then(of).unwrap_or(0.0);
+        one(present).hypot(one(measured))
+    };
+    let diagonal_m = distance_m(present.corners[0], present.corners[2]);
+    let at_least = |least_m: f64, sigma_m: f64| least_m.max(SAME_SHARE * diagonal_m).max(SAME_SIGMAS * sigma_m);
+    let moved_m = distance_m(present.centre(), measured.centre());
+    let limit_m = at_least(SAME_CENTRE_M, sigma_m(|sigma| Some(sigma.position_m)));
+    let sides = |descriptor: &MaterialDescriptor| {
+        [0, 1].map(|side| distance_m(descriptor.corners[side], descriptor.corners[side + 1]))
+    };
+    let ([width, height], [other_width, other_height]) = (sides(present), sides(measured));
+    let grown_m = (width - other_width).abs().max((height - other_height).abs());
+    let side_limit_m = at_least(SAME_SIDE_M, sigma_m(|sigma| sigma.size_m));
+    if moved_m > limit_m || grown_m > side_limit_m {
+        return Relation::Replaces;
+    }
+    Relation::Same { moved_m, limit_m }
 }
 
 fn dynamic_relation(present: &DynamicDescriptor, measured: &DynamicDescriptor) -> Relation {
@@ -276,6 +351,40 @@ mod tests {
             })
             .collect();
         assert_eq!(gone, [2, 1]);
+    }
+
+    #[test]
+    fn a_chair_that_is_gone_here_and_seen_half_a_metre_away_was_moved() {
+        let map = [(1, chair(0.0)), (2, chair(5.0))];
+        for moved_m in [0.45, 0.6, 2.0] {
+            let proposals = vec![remove(&chair(0.0), 0.2), place(chair(moved_m))];
+            let resolution = resolve(proposals, &[region()], &map);
+            let expected = Change::Modify { fid: 1, before: chair(0.0), after: chair(moved_m) };
+            assert_eq!((resolution.changes, resolution.rejections), (vec![expected], vec![]));
+        }
+    }
+
+    #[test]
+    fn a_chair_that_is_gone_here_and_seen_here_stayed() {
+        let resolution = resolve(vec![remove(&chair(0.0), 0.2), place(chair(0.1))], &[region()], &[(1, chair(0.0))]);
+        assert!(resolution.changes.is_empty());
+        assert_eq!(resolution.rejections[0].requirement, "already-on-map");
+    }
+
+    #[test]
+    fn one_of_two_moved_chairs_takes_the_nearer_place() {
+        let map = [(1, chair(0.0)), (2, chair(1.5))];
+        let proposals = vec![remove(&chair(0.0), 0.2), remove(&chair(1.5), 0.2), place(chair(0.7)), place(chair(2.1))];
+        let resolution = resolve(proposals, &[region()], &map);
+        let moves: Vec<(u64, Descriptor)> = resolution
+            .changes
+            .into_iter()
+            .map(|change| match change {
+                Change::Modify { fid, after, .. } => (fid, after),
+                other => panic!("expected a move, found {other:?}"),
+            })
+            .collect();
+        assert_eq!(moves, [(2, chair(2.1)), (1, chair(0.7))]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The detector: from photo and view to regions.
 
+use crate::hidden::{is_hidden, unexplained};
 use crate::pairs::pair_regions;
 use crate::raster::Rasters;
 use crate::realign::explained;
@@ -68,23 +69,28 @@ impl ClassDifference {
         let mut new = Vec::new();
         for pixels in added {
             let class = ClassId(rasters.photo[pixels[0]]);
-            let is_material = classes.kind(class) == ClassKind::Material;
-            if is_material {
-                let sure: Vec<usize> = pixels.iter().copied().filter(|pixel| changed[*pixel]).collect();
-                let own = pixels.iter().filter(|pixel| !same_descriptor[**pixel]).count();
-                let share = sure.len() as f64 / own.max(1) as f64;
-                let unc = is_uncovered(host, comparison, rasters, &tolerance, &sure, class)?;
-                if share < settings.min_sure_share || unc {
-                    continue;
-                }
+            let sure: Vec<usize> = pixels.iter().copied().filter(|pixel| changed[*pixel]).collect();
+            // Parts of the base map move into each other's place; what a descriptor grows by is no part of it.
+            let is_of_descriptor = pixels.iter().any(|pixel| same_descriptor[*pixel]);
+            let is_enough = sure.len() as f64 >= settings.min_sure_share * pixels.len() as f64;
+            if classes.kind(class) == ClassKind::Material
+                && (!(is_enough || is_of_descriptor)
+                    || is_uncovered(host, comparison, rasters, &tolerance, &sure, class)?)
+            {
+                continue;
             }
             new.push(region(rasters, &pixels, class, settings.max_hole_share));
         }
+        let unexplained = unexplained(rasters, classes, &tolerance_px);
         let is_large = |seen: &&Seen| seen.pixels.len() >= limit_px(rasters.view[seen.pixels[0]]);
-        let gone = descriptors.iter().filter(is_large).filter(|seen| seen.is_gone(&evidence)).map(|seen| {
-            let shown = seen.pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
-            region(rasters, &seen.pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
-        });
+        let gone = descriptors
+            .iter()
+            .filter(is_large)
+            .filter(|seen| seen.is_gone(&evidence) && !is_hidden(rasters, seen, &unexplained))
+            .map(|seen| {
+                let shown = seen.pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
+                region(rasters, &seen.pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
+            });
         Ok(gone.chain(new).collect())
     }
 

@@ -9,6 +9,7 @@
 
 pub mod components;
 pub mod detector;
+pub mod hidden;
 pub mod pairs;
 pub mod raster;
 pub mod realign;
