@@ -1,11 +1,14 @@
 //! Dynamic descriptors: an object of predefined size where its foot meets the ground (Lee & Hsu, Eq. 16).
 
 use crate::contact::ground_contact;
+use crate::crowd::{Search, starts};
 use crate::edges::shows_map_below;
+use crate::evidence::Evidence;
 use crate::outline::Outline;
 use crate::quad::median;
 use crate::requirement::{Stop, Unmet, at_most};
 use crate::sight::Sight;
+use crate::silhouette::radius_m;
 use crate::spread::nudges;
 use crate::window::rays;
 use nalgebra::Vector3;
@@ -20,32 +23,22 @@ const MAX_FOOT_HIDDEN: f64 = 0.7;
 /// The foot that is seen is the near edge of the base. Its distance from the centre, over half a side of a square base,
 /// is 1 to √2, and 4/π·ln(1 + √2) on the mean over all headings.
 const NEAR_EDGE: f64 = 1.122;
-/// Misfit by which two objects must explain a region better than one.
-const SPLIT_GAIN: f64 = 0.15;
-/// Places at which a cut between two objects is tried.
-const CUTS: u32 = 24;
-/// Fewest columns of an object, pixels.
-const MIN_WIDTH_PX: u32 = 4;
-/// Cuts within cuts, at most: eight objects in a region.
-const MAX_DEPTH: u32 = 3;
+/// Columns of a region from which objects are looked for.
+const COLUMNS: u32 = 7;
+/// Most by which the noise of the labels widens the limit of the size, as a share.
+const MAX_SIZE_NOISE: f64 = 0.25;
 
 /// An object measured, and how well it fits its predefined size.
 struct Found {
     contact: Vector3<f64>,
     position: Vector3<f64>,
-    foot_px: [f64; 2],
+    /// 1σ of the position from the labels alone, metres.
+    labels_m: f64,
     /// Share of the foot that something hides.
     foot_hidden: f64,
-    /// Width and height over those of the predefined size.
-    size_ratio: [f64; 2],
-}
-
-impl Found {
-    /// How far off the shape is, and half as much the size: a wrong range changes the size, not the shape.
-    fn misfit(&self) -> f64 {
-        let [width, height] = self.size_ratio.map(|ratio| ratio.max(1e-3).ln());
-        (width - height).abs() + height.abs() / 2.0
-    }
+    /// Width and height over those of the predefined size, or the inverse; and the largest there may be.
+    size_factor: [f64; 2],
+    max_size_factor: [f64; 2],
 }
 
 /// The dynamic descriptors of `region`, one for each object in it.
@@ -58,8 +51,10 @@ pub fn measure(
     at_most("captured-entirely", outline.border_pixels(width, height) as f64, 0.0, "px")?;
     let no_size = Unmet { requirement: "predefined-size", measured: 0.0, limit: 1.0, unit: "sizes" };
     let size_m = sight.host.classes().get(region.class_after).and_then(|class| class.size_m).ok_or(no_size)?;
-    let mut objects = Vec::new();
-    split(sight, outline, size_m, MAX_DEPTH, &mut objects)?;
+    let objects = match several(sight, outline, size_m)? {
+        Some(several) => several,
+        None => vec![find(sight, outline, size_m)],
+    };
     let mut answers = Vec::new();
     for object in objects {
         match object.and_then(|found| descriptor(sight, region, size_m, &found)) {
@@ -71,50 +66,51 @@ pub fn measure(
     Ok(answers)
 }
 
-/// Pushes the objects of `outline`: itself, or those on either side of a cut where two fit the predefined size clearly
-/// better than one.
-fn split(
-    sight: &Sight<'_>,
-    outline: &Outline,
-    size_m: [f64; 3],
-    depth: u32,
-    objects: &mut Vec<Result<Found, Stop>>,
-) -> Result<(), Stop> {
-    let whole = find(sight, outline, size_m);
-    let whole_misfit = match &whole {
-        Ok(found) => found.misfit(),
-        Err(Stop::Unmet(_)) => f64::INFINITY,
-        Err(host) => return Err(host.clone()),
-    };
-    if depth > 0 && whole_misfit > SPLIT_GAIN {
-        let width_px = outline.bounds.width();
-        let mut best: Option<(f64, Outline, Outline)> = None;
-        for cut in 1..CUTS {
-            let column = outline.bounds.left + width_px * cut / CUTS;
-            let (Some(left), Some(right)) =
-                (outline.columns(outline.bounds.left, column), outline.columns(column, outline.bounds.right))
-            else {
-                continue;
-            };
-            if left.bounds.width() < MIN_WIDTH_PX || right.bounds.width() < MIN_WIDTH_PX {
-                continue;
-            }
-            if let (Ok(a), Ok(b)) = (find(sight, &left, size_m), find(sight, &right, size_m)) {
-                let misfit = (a.misfit() + b.misfit()) / 2.0;
-                if best.as_ref().is_none_or(|(least, ..)| misfit < *least) {
-                    best = Some((misfit, left, right));
-                }
-            }
-        }
-        if let Some((misfit, left, right)) = best
-            && misfit + SPLIT_GAIN < whole_misfit
-        {
-            split(sight, &left, size_m, depth - 1, objects)?;
-            return split(sight, &right, size_m, depth - 1, objects);
+/// The objects of `outline` where several explain it clearly better than one.
+fn several(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Option<Vec<Result<Found, Stop>>>, Stop> {
+    let ends = column_ends(outline);
+    let pixels: Vec<[f64; 2]> = ends.iter().flatten().copied().collect();
+    let directions = rays(sight.host, sight.pose(), &pixels)?;
+    let (mut lows, mut highs) = (Vec::new(), Vec::new());
+    for ends in directions.chunks(2) {
+        highs.push(ends[0]);
+        match ground_contact(sight, &ends[1]) {
+            Ok(contact) => lows.push(contact),
+            Err(Stop::Unmet(_)) => {}
+            Err(host) => return Err(host),
         }
     }
-    objects.push(whole);
-    Ok(())
+    let Some(nearest) = lows.iter().min_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Ok(None) };
+    let evidence = Evidence::new(sight, outline, [nearest.xy().norm(), nearest.z]);
+    let search = Search { sight, evidence: &evidence, size_m };
+    let Some(members) = search.objects(&starts(size_m, &lows, &highs))? else { return Ok(None) };
+    let found = (0..members.len()).map(|index| {
+        let position = members[index].foot;
+        let ahead = Vector3::new(position.x, position.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+        let front = ahead * radius_m(size_m);
+        let contact = ground_contact(sight, &(position - front).normalize())?;
+        // What seems to stand in the wall stands against it.
+        let is_nearer = contact.norm() < (position - front).norm();
+        let position = if is_nearer { contact + front } else { position };
+        let labels_m = search.sigma_m(&members, index)?;
+        let [size_factor, max_size_factor] = [[1.0; 2]; 2];
+        Ok(Found { contact, position, labels_m, foot_hidden: 0.0, size_factor, max_size_factor })
+    });
+    Ok(Some(found.collect()))
+}
+
+/// Highest and lowest place of the region in some of its columns.
+fn column_ends(outline: &Outline) -> Vec<[[f64; 2]; 2]> {
+    let bounds = outline.bounds;
+    let column = |number: u32| {
+        let share = f64::from(2 * number + 1) / f64::from(2 * COLUMNS);
+        let u = bounds.left + (f64::from(bounds.width()) * share) as u32;
+        let mut rows = (bounds.top..bounds.bottom).filter(|v| outline.contains(i64::from(u), i64::from(*v)));
+        let top = rows.next()?;
+        let bottom = rows.next_back().unwrap_or(top) + 1;
+        Some([top, bottom].map(|v| [f64::from(u) + 0.5, f64::from(v)]))
+    };
+    (0..COLUMNS).filter_map(column).collect()
 }
 
 /// The object that `outline` shows, taken to be one.
@@ -137,9 +133,18 @@ fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found,
         let along = |pick: fn(f64, f64) -> f64, start| seen.iter().map(|p| p[axis]).fold(start, pick);
         along(f64::max, f64::NEG_INFINITY) - along(f64::min, f64::INFINITY)
     };
-    let height_px = f64::from(outline.bounds.height());
-    let width_px = width_px(outline);
-    Ok(Found { contact, position, foot_px, foot_hidden, size_ratio: [width_px / reach(0), height_px / reach(1)] })
+    let expected_px = [reach(0), reach(1)];
+    let ratios = [width_px(outline) / expected_px[0], f64::from(outline.bounds.height()) / expected_px[1]];
+    let settings = sight.settings;
+    let noise = |px: f64| (2.0 * settings.label_jitter_px / px.max(1.0)).min(MAX_SIZE_NOISE);
+    Ok(Found {
+        contact,
+        position,
+        labels_m: foot_sigma_m(sight, &contact, foot_px)?,
+        foot_hidden,
+        size_factor: ratios.map(|ratio| ratio.max(1.0 / ratio)),
+        max_size_factor: expected_px.map(|px| settings.max_size_factor * (1.0 + noise(px))),
+    })
 }
 
 /// The median row's pixels: contours that wander have tips, and blobs bite pieces out.
@@ -181,8 +186,9 @@ fn descriptor(
     let settings = sight.settings;
     at_most("captured-entirely", found.foot_hidden, MAX_FOOT_HIDDEN, "ratio")?;
     at_most("within-range", found.contact.norm(), settings.max_range_m, "m")?;
-    let factor = found.size_ratio.iter().map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max);
-    at_most("size", factor, settings.max_size_factor, "ratio")?;
+    for (factor, limit) in found.size_factor.into_iter().zip(found.max_size_factor) {
+        at_most("size", factor, limit, "ratio")?;
+    }
     let position_m = position_sigma_m(sight, found)?;
     at_most("uncertain", position_m, settings.max_dynamic_sigma_m, "m")?;
     Ok(DynamicDescriptor {
@@ -194,24 +200,27 @@ fn descriptor(
     })
 }
 
-/// 1σ of the position, metres: the pose moved by 1σ each way, and the foot by the jitter of the labels.
-fn position_sigma_m(sight: &Sight<'_>, found: &Found) -> Result<f64, Stop> {
-    let ground_m = found.contact.z;
-    let meet = |eye: Vector3<f64>, direction: Vector3<f64>| {
-        let times = (ground_m - eye.z) / direction.z;
-        if times > 0.0 && times.is_finite() { eye + direction * times } else { Vector3::repeat(f64::INFINITY) }
-    };
-    let [u, v] = found.foot_px;
+/// Where a ray meets level ground at `ground_m`.
+fn meet(ground_m: f64, eye: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
+    let times = (ground_m - eye.z) / direction.z;
+    if times > 0.0 && times.is_finite() { eye + direction * times } else { Vector3::repeat(f64::INFINITY) }
+}
+
+/// 1σ of a contact seen at `foot_px`, metres, from the jitter of the labels.
+fn foot_sigma_m(sight: &Sight<'_>, contact: &Vector3<f64>, [u, v]: [f64; 2]) -> Result<f64, Stop> {
     let jitter_px = sight.settings.label_jitter_px;
-    let seen = rays(sight.host, sight.pose(), &[[u, v], [u + jitter_px, v], [u, v + jitter_px]])?;
-    let mut variance = 0.0;
-    for direction in &seen[1..] {
-        variance += (meet(Vector3::zeros(), *direction) - found.contact).norm_squared();
-    }
+    let moved = rays(sight.host, sight.pose(), &[[u + jitter_px, v], [u, v + jitter_px]])?;
+    let square_m2 = |ray: &Vector3<f64>| (meet(contact.z, &Vector3::zeros(), ray) - contact).norm_squared();
+    Ok(moved.iter().map(square_m2).sum::<f64>().sqrt())
+}
+
+/// 1σ of the position, metres: that of the labels, and the pose moved by 1σ each way.
+fn position_sigma_m(sight: &Sight<'_>, found: &Found) -> Result<f64, Stop> {
     let not_finite =
         Unmet { requirement: "uncertain", measured: f64::MAX, limit: sight.settings.max_dynamic_sigma_m, unit: "m" };
+    let (contact, mut variance) = (found.contact, found.labels_m.powi(2));
     for nudge in nudges(&sight.comparison.estimate).ok_or(not_finite)? {
-        variance += (meet(nudge.offset, nudge.turn * seen[0]) - found.contact).norm_squared();
+        variance += (meet(contact.z, &nudge.offset, &(nudge.turn * contact)) - contact).norm_squared();
     }
     Ok(variance.sqrt())
 }

@@ -32,11 +32,12 @@ pub fn is_true_edge(sight: &Sight<'_>, outline: &Outline, point: &ContourPoint, 
 /// Whether the photo shows what the map has below column `u` of something that ends at row `end`: not where something
 /// that the map has not may stand in front.
 pub fn shows_map_below(sight: &Sight<'_>, u: u32, end: u32) -> bool {
-    let shows = |step: i64| {
-        let (u, v) = (i64::from(u), i64::from(end) - 1 + step);
-        sight.photo(u, v).is_some_and(|photo| has_nearby(sight, u, v, photo))
-    };
-    PROBE_PX.into_iter().any(shows)
+    PROBE_PX.into_iter().any(|step| shows_map(sight, i64::from(u), i64::from(end) - 1 + step))
+}
+
+/// Whether the photo shows at pixel `u`, `v` what the map has there or near by.
+pub fn shows_map(sight: &Sight<'_>, u: i64, v: i64) -> bool {
+    sight.photo(u, v).is_some_and(|photo| sight.view(u, v) == Some(photo) || has_nearby(sight, u, v, photo))
 }
 
 fn has_nearby(sight: &Sight<'_>, u: i64, v: i64, class: ClassId) -> bool {

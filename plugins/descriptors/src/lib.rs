@@ -6,9 +6,11 @@
 #![forbid(unsafe_code)]
 
 pub mod contact;
+pub mod crowd;
 pub mod dynamic;
 pub mod edges;
 pub mod estimator;
+pub mod evidence;
 pub mod fit;
 pub mod hull;
 pub mod material;
@@ -22,6 +24,7 @@ pub mod requirement;
 pub mod settings;
 pub mod shape;
 pub mod sight;
+pub mod silhouette;
 pub mod spread;
 pub mod window;
 
