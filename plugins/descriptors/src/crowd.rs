@@ -19,8 +19,11 @@ const MIN_INSIDE: f64 = 0.7;
 const MIN_VISIBLE: f64 = 0.25;
 /// Misfit of all over the pixels of the region, at most.
 const MAX_MISFIT: f64 = 0.35;
+/// Widths and heights, over those of the predefined size, of one object that is to explain the region alone: one that is
+/// large for its class is not two.
+const SIZES: [f64; 3] = [1.0, 1.15, 1.3];
 /// Two objects are at least this many sides apart.
-const MIN_APART: f64 = 0.8;
+const MIN_APART: f64 = 0.95;
 /// Starts that are refined.
 const KEPT: usize = 4;
 /// First and smallest step of the search, metres across; along the line of sight more, as the ground is foreshortened.
@@ -42,6 +45,7 @@ pub struct Member {
 }
 
 /// What a crowd is looked for in.
+#[derive(Clone, Copy)]
 pub struct Search<'a> {
     /// The photo and the map.
     pub sight: &'a Sight<'a>,
@@ -67,11 +71,13 @@ impl Search<'_> {
         }
         let firsts = single.iter().map(|member| vec![member.clone()]);
         let Some(mut best) = self.best(firsts.collect())? else { return Ok(None) };
+        best.misfit_px = self.large_misfit_px(&best)?;
         while best.members.len() < MAX_OBJECTS {
             let pairs = best.members.len() == 1;
             let bases = if pairs { single.iter().map(|one| vec![one.clone()]).collect() } else { vec![] };
             let bases: Vec<Vec<Member>> = bases.into_iter().chain([best.members.clone()]).collect();
-            let more = bases.iter().flat_map(|base| single.iter().map(|one| [&base[..], std::slice::from_ref(one)].concat()));
+            let more =
+                bases.iter().flat_map(|base| single.iter().map(|one| [&base[..], std::slice::from_ref(one)].concat()));
             let Some(more) = self.best(more.collect())? else { break };
             if !self.is_better(&more, &best) {
                 break;
@@ -80,6 +86,23 @@ impl Search<'_> {
         }
         let explains = best.misfit_px <= MAX_MISFIT * self.evidence.region_px;
         Ok((best.members.len() > 1 && explains).then_some(best.members))
+    }
+
+    /// The misfit of one object at its best size.
+    fn large_misfit_px(&self, alone: &Crowd) -> Result<f64, Error> {
+        let mut least_px = alone.misfit_px;
+        for [width, height] in SIZES.into_iter().flat_map(|width| SIZES.map(|height| [width, height])) {
+            let [x, y, z] = self.size_m;
+            let search = Search { size_m: [x * width, y * width, z * height], ..*self };
+            let mut members = Vec::new();
+            for member in &alone.members {
+                members.extend(search.member(member.foot)?);
+            }
+            if let Some(crowd) = search.best(vec![members])? {
+                least_px = least_px.min(crowd.misfit_px);
+            }
+        }
+        Ok(least_px)
     }
 
     /// 1σ of each coordinate together of member `index`, metres, from the contours that are seen of it; infinite where
