@@ -25,8 +25,6 @@ const MAX_FOOT_HIDDEN: f64 = 0.7;
 const NEAR_EDGE: f64 = 1.122;
 /// Columns of a region from which objects are looked for.
 const COLUMNS: u32 = 7;
-/// Most by which the noise of the labels widens the limit of the size, as a share.
-const MAX_SIZE_NOISE: f64 = 0.25;
 
 /// An object measured, and how well it fits its predefined size.
 struct Found {
@@ -36,9 +34,8 @@ struct Found {
     labels_m: f64,
     /// Share of the foot that something hides.
     foot_hidden: f64,
-    /// Width and height over those of the predefined size, or the inverse; and the largest there may be.
-    size_factor: [f64; 2],
-    max_size_factor: [f64; 2],
+    /// Width or height over that of the predefined size, or the inverse, whichever is most.
+    size_factor: f64,
 }
 
 /// The dynamic descriptors of `region`, one for each object in it.
@@ -93,8 +90,7 @@ fn several(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Opt
         let is_nearer = contact.norm() < (position - front).norm();
         let position = if is_nearer { contact + front } else { position };
         let labels_m = search.sigma_m(&members, index)?;
-        let [size_factor, max_size_factor] = [[1.0; 2]; 2];
-        Ok(Found { contact, position, labels_m, foot_hidden: 0.0, size_factor, max_size_factor })
+        Ok(Found { contact, position, labels_m, foot_hidden: 0.0, size_factor: 1.0 })
     });
     Ok(Some(found.collect()))
 }
@@ -133,17 +129,13 @@ fn find(sight: &Sight<'_>, outline: &Outline, size_m: [f64; 3]) -> Result<Found,
         let along = |pick: fn(f64, f64) -> f64, start| seen.iter().map(|p| p[axis]).fold(start, pick);
         along(f64::max, f64::NEG_INFINITY) - along(f64::min, f64::INFINITY)
     };
-    let expected_px = [reach(0), reach(1)];
-    let ratios = [width_px(outline) / expected_px[0], f64::from(outline.bounds.height()) / expected_px[1]];
-    let settings = sight.settings;
-    let noise = |px: f64| (2.0 * settings.label_jitter_px / px.max(1.0)).min(MAX_SIZE_NOISE);
+    let ratios = [width_px(outline) / reach(0), f64::from(outline.bounds.height()) / reach(1)];
     Ok(Found {
         contact,
         position,
         labels_m: foot_sigma_m(sight, &contact, foot_px)?,
         foot_hidden,
-        size_factor: ratios.map(|ratio| ratio.max(1.0 / ratio)),
-        max_size_factor: expected_px.map(|px| settings.max_size_factor * (1.0 + noise(px))),
+        size_factor: ratios.into_iter().map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max),
     })
 }
 
@@ -186,9 +178,7 @@ fn descriptor(
     let settings = sight.settings;
     at_most("captured-entirely", found.foot_hidden, MAX_FOOT_HIDDEN, "ratio")?;
     at_most("within-range", found.contact.norm(), settings.max_range_m, "m")?;
-    for (factor, limit) in found.size_factor.into_iter().zip(found.max_size_factor) {
-        at_most("size", factor, limit, "ratio")?;
-    }
+    at_most("size", found.size_factor, settings.max_size_factor, "ratio")?;
     let position_m = position_sigma_m(sight, found)?;
     at_most("uncertain", position_m, settings.max_dynamic_sigma_m, "m")?;
     Ok(DynamicDescriptor {
