@@ -28,8 +28,6 @@ const SAME_OBJECT_SHARE: f64 = 1.0;
 const MOVE_REACH_M: f64 = 2.5;
 /// One that moved by less stayed, metres: 1 m of range is 4 px at 10 m.
 const LEAST_MOVE_M: f64 = 0.25;
-/// The same in 1σ of the difference.
-const MOVE_SIGMAS: f64 = 2.0;
 
 /// One change of the map.
 #[derive(Clone, Debug, PartialEq)]
@@ -201,9 +199,9 @@ impl Resolver<'_> {
             }
             let Some((moved_m, index, at)) = nearest else { break };
             let (Some((region, object)), (fid, before)) = (objects[index].take(), gone.swap_remove(at)) else { break };
-            let sigma_m = |sigma: Option<Uncertainty>| sigma.map_or(0.0, |sigma| sigma.position_m);
-            let limit_m = MOVE_SIGMAS * sigma_m(object.sigma).hypot(sigma_m(before.sigma()));
-            let limit_m = limit_m.clamp(LEAST_MOVE_M, SAME_OBJECT_SHARE * object.size_m[0].min(object.size_m[1]));
+            let size_m = SAME_OBJECT_SHARE * object.size_m[0].min(object.size_m[1]);
+            // That it is seen to be gone from its place speaks for a move, so the least one is enough.
+            let limit_m = move_limit_m(before.sigma(), object.sigma, size_m).min(size_m / 2.0);
             if moved_m > limit_m {
                 let after = Descriptor::Dynamic(object);
                 self.resolution.changes.push(Change::Modify { fid, before, after });
@@ -277,11 +275,19 @@ fn material_relation(present: &MaterialDescriptor, measured: &MaterialDescriptor
 
 fn dynamic_relation(present: &DynamicDescriptor, measured: &DynamicDescriptor) -> Relation {
     let moved_m = distance_m(present.position, measured.position);
-    let limit_m = SAME_OBJECT_SHARE * present.size_m[0].min(present.size_m[1]);
-    if present.class == measured.class && moved_m <= limit_m {
-        return Relation::Same { moved_m, limit_m };
+    let size_m = SAME_OBJECT_SHARE * present.size_m[0].min(present.size_m[1]);
+    if present.class != measured.class || moved_m > size_m {
+        return Relation::Unrelated;
     }
-    Relation::Unrelated
+    let limit_m = move_limit_m(present.sigma, measured.sigma, size_m);
+    // Two objects cannot stand within each other: one that is surely elsewhere by less than its size was moved.
+    if moved_m <= limit_m { Relation::Same { moved_m, limit_m } } else { Relation::Replaces }
+}
+
+/// How far apart two measurements of one object may be, at most `size_m`; as much where one does not say how sure it is.
+fn move_limit_m(present: Option<Uncertainty>, measured: Option<Uncertainty>, size_m: f64) -> f64 {
+    let (Some(present), Some(measured)) = (present, measured) else { return size_m };
+    (SAME_SIGMAS * present.position_m.hypot(measured.position_m)).max(LEAST_MOVE_M).min(size_m)
 }
 
 #[cfg(test)]
@@ -362,6 +368,22 @@ mod tests {
             let expected = Change::Modify { fid: 1, before: chair(0.0), after: chair(moved_m) };
             assert_eq!((resolution.changes, resolution.rejections), (vec![expected], vec![]));
         }
+    }
+
+    #[test]
+    fn a_chair_surely_seen_within_its_own_size_beside_its_place_was_moved() {
+        let sure = |east: f64, position_m: f64| match chair(east) {
+            Descriptor::Dynamic(chair) => {
+                let sigma = Some(Uncertainty { position_m, size_m: None, area_m2: None });
+                Descriptor::Dynamic(DynamicDescriptor { sigma, ..chair })
+            }
+            material @ Descriptor::Material(_) => material,
+        };
+        let map = [(1, sure(0.0, 0.05))];
+        let moved = resolve(vec![place(sure(0.45, 0.1))], &[region()], &map);
+        assert_eq!(moved.changes, [Change::Modify { fid: 1, before: sure(0.0, 0.05), after: sure(0.45, 0.1) }]);
+        let unsure = resolve(vec![place(sure(0.45, 0.3))], &[region()], &map);
+        assert_eq!((unsure.changes, unsure.rejections[0].requirement.as_str()), (vec![], "already-on-map"));
     }
 
     #[test]
