@@ -9,7 +9,8 @@ use resurvey_plugin::schema::{ClassId, ClassKind, ClassTable};
 /// What stands in front covers at least this many times the descriptor's pixels beside it.
 const MIN_BESIDE: f64 = 0.35;
 
-/// Where the photo has a class that is otherwise ignored, not the sky, and the view has it nowhere within the tolerance.
+/// Where, beside descriptors, the photo has a class that is otherwise ignored, not the sky, and the view has it nowhere
+/// within the tolerance.
 pub fn unexplained(rasters: &Rasters, classes: &ClassTable, tolerance_px: &[u8]) -> Vec<bool> {
     let sky = classes.by_name("sky").map(|class| class.index.0);
     let may_hide: Vec<bool> = (0..=u8::MAX)
@@ -18,7 +19,12 @@ pub fn unexplained(rasters: &Rasters, classes: &ClassTable, tolerance_px: &[u8])
         })
         .collect();
     let asked: Vec<bool> = (0..rasters.photo.len())
-        .map(|at| may_hide[usize::from(rasters.photo[at])] && rasters.photo[at] != rasters.view[at])
+        .map(|at| {
+            // What a descriptor stood before is behind it, and nothing that hides it.
+            rasters.features[at] == 0
+                && may_hide[usize::from(rasters.photo[at])]
+                && rasters.photo[at] != rasters.view[at]
+        })
         .collect();
     let found = explained(&rasters.photo, &rasters.view, tolerance_px, rasters.width, &asked);
     asked.into_iter().zip(found).map(|(asked, found)| asked && !found).collect()
