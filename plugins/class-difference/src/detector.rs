@@ -12,6 +12,9 @@ use crate::uncovered::is_uncovered;
 use resurvey_plugin::schema::{ChangeRegion, ClassId, ClassKind, ClassTable};
 use resurvey_plugin::{Comparison, Detector, Error, Host, Plugin};
 
+/// So many times the smallest region are never left to errors of the map alone.
+const MUCH: usize = 5;
+
 /// Detects changes as differences of class between photo and view.
 pub struct ClassDifference {
     settings: Settings,
@@ -72,7 +75,9 @@ impl ClassDifference {
             let sure: Vec<usize> = pixels.iter().copied().filter(|pixel| changed[*pixel]).collect();
             // Parts of the base map move into each other's place; what a descriptor grows by is no part of it.
             let is_of_descriptor = pixels.iter().any(|pixel| same_descriptor[*pixel]);
-            let is_enough = sure.len() as f64 >= settings.min_sure_share * pixels.len() as f64;
+            // Much of a façade can change between its windows: that is for the estimator to place or to refuse by name.
+            let is_much = sure.len() >= MUCH * limit_px(class.0);
+            let is_enough = is_much || sure.len() as f64 >= settings.min_sure_share * pixels.len() as f64;
             if classes.kind(class) == ClassKind::Material
                 && (!(is_enough || is_of_descriptor)
                     || is_uncovered(host, comparison, rasters, &tolerance, &sure, class)?)
