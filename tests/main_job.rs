@@ -71,6 +71,34 @@ fn a_chair_that_is_gone_leaves_the_map_and_the_other_stays() {
 }
 
 #[test]
+fn a_photo_from_another_pose_of_what_has_changed_changes_nothing() {
+    for (scene, change) in [(SceneKind::Street, ChangeKind::Banner), (SceneKind::Hall, ChangeKind::ChairRemoved)] {
+        let place = Place::new(Scene::new(scene, 7), "3ds");
+        let (_, [first, second]) = place.two_photos(change, NoiseLevel::LIGHT, 9);
+        let found = place.run("update", &[path(&first)]);
+        assert_eq!(found.json["changes"].as_array().map(Vec::len), Some(1), "{}", found.json);
+        let again = place.run("update", &[path(&second)]);
+        assert_eq!(again.code, 20, "{change:?}: {}", again.messages);
+        assert_eq!(again.json["changes"].as_array().map(Vec::len), Some(0), "{}", again.json);
+    }
+}
+
+#[test]
+fn a_chair_that_was_moved_is_one_modification() {
+    let place = Place::new(Scene::new(SceneKind::Hall, 7), "3ds");
+    let (case, capture) = place.capture(ChangeKind::ChairMoved, NoiseLevel::LIGHT, 5);
+    let answer = place.run("update", &[path(&capture)]);
+    assert_eq!(answer.code, 0, "{}", answer.messages);
+    let changes = answer.json["changes"].as_array().unwrap();
+    assert_eq!(changes.len(), 1, "{changes:?}");
+    assert_eq!((changes[0]["op"].as_str(), changes[0]["class"].as_str()), (Some("modify"), Some("chair")));
+    let off_m = plan_distance_m(&changes[0]["after"]["position"], case.truth.changes[0].position.unwrap());
+    assert!(off_m < 0.3, "{off_m:.2} m off");
+    let chairs = place.run("query", &["--class", "chair"]);
+    assert_eq!(chairs.json["features"].as_array().map(Vec::len), Some(1), "{}", chairs.json);
+}
+
+#[test]
 fn a_photo_of_an_unchanged_place_changes_nothing() {
     let place = Place::new(Scene::new(SceneKind::Street, 7), "3ds");
     let (_, capture) = place.capture(ChangeKind::None, NoiseLevel::LIGHT, 8);

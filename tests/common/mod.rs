@@ -64,9 +64,19 @@ impl Place {
 
     /// A capture of the place; the map learns what it knew before. Returns it and the path of `capture.json`.
     pub fn capture(&self, change: ChangeKind, noise: NoiseLevel, seed: u64) -> (Case, PathBuf) {
-        let name = format!("capture-{}-{seed}", change.name());
-        let spec = CaseSpec { name, change, noise, seed, grid_prior: false };
-        let case = Case::new(&self.scene, spec).expect("a pose shows the change");
+        self.written(Case::new(&self.scene, spec(change, noise, seed)).expect("a pose shows the change"))
+    }
+
+    /// The same, and the path of a second photo's `capture.json` where one can be taken.
+    pub fn two_photos(&self, change: ChangeKind, noise: NoiseLevel, seed: u64) -> (Case, [PathBuf; 2]) {
+        let case = Case::with_second(&self.scene, spec(change, noise, seed)).expect("a pose shows the change");
+        assert!(case.second.is_some(), "a second pose shows the change");
+        let (case, first) = self.written(case);
+        let second = first.with_file_name("second").join("capture.json");
+        (case, [first, second])
+    }
+
+    fn written(&self, case: Case) -> (Case, PathBuf) {
         let folder = write_case(&case, self.directory.path()).expect("the capture is written");
         if !case.base_changes.is_empty() {
             let applied = self.run("apply", &[path(&folder.join("base.changes.jsonl"))]);
@@ -74,6 +84,11 @@ impl Place {
         }
         (case, folder.join("capture.json"))
     }
+}
+
+fn spec(change: ChangeKind, noise: NoiseLevel, seed: u64) -> CaseSpec {
+    let name = format!("capture-{}-{seed}", change.name());
+    CaseSpec { name, change, noise, seed, grid_prior: false }
 }
 
 /// A path as text.

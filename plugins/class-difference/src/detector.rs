@@ -64,7 +64,13 @@ impl ClassDifference {
         // What was behind a descriptor that is gone is no new material.
         let changed: Vec<bool> =
             (0..different.len()).map(|at| different[at] && !expected[at] && !shows_behind[at]).collect();
-        let same_descriptor = same_descriptor(rasters, classes);
+        let mut same_descriptor = same_descriptor(rasters, classes);
+        // Where one that is not there any more shows its class, another of its kind stands: all of that is one region.
+        for descriptor in descriptors.iter().filter(|descriptor| !descriptor.is_still_there(settings)) {
+            for pixel in &descriptor.pixels {
+                same_descriptor[*pixel] |= rasters.photo[*pixel] == rasters.view[*pixel];
+            }
+        }
         let growth = Growth { changed: &changed, different: &different, same_descriptor: &same_descriptor };
         let grown = grow(rasters, &tolerance_px, &growth);
         let limit_px = |class: u8| self.limit_px(classes, class, rasters.photo.len());
@@ -94,7 +100,7 @@ impl ClassDifference {
             .filter(|seen| seen.is_gone(&evidence) && !is_hidden(rasters, seen, &unexplained))
             .map(|seen| {
                 let shown = seen.pixels.iter().filter(|pixel| shows_behind[**pixel]).map(|pixel| rasters.photo[*pixel]);
-                region(rasters, &seen.pixels, ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
+                region(rasters, &seen.free(rasters), ClassId(most_frequent(shown).unwrap_or(ClassId::VOID.0)), 0.0)
             });
         Ok(gone.chain(new).collect())
     }

@@ -17,6 +17,9 @@ const SHIFT_COST: f64 = 0.15;
 /// Largest shift, as a multiple of the largest tolerance of a pixel.
 const MAX_SHIFT: f64 = 4.0;
 
+/// Share of its pixels that show another class than its own, at least, to judge by.
+const MIN_FREE: f64 = 0.4;
+
 /// What there is to judge by.
 pub struct Evidence<'a> {
     /// Photo and view.
@@ -68,10 +71,18 @@ impl Seen {
         self.still_share >= settings.still_share
     }
 
-    /// Whether the photo shows what is behind it instead.
+    /// Its pixels at which the photo shows another class.
+    pub fn free(&self, rasters: &Rasters) -> Vec<usize> {
+        self.pixels.iter().copied().filter(|pixel| rasters.photo[*pixel] != self.class).collect()
+    }
+
+    /// Whether the photo shows what is behind it instead. Where it shows the descriptor's own class after all, another
+    /// of its kind stands in front.
     pub fn is_gone(&self, evidence: &Evidence<'_>) -> bool {
-        let behind = self.pixels.iter().filter(|pixel| evidence.shows_behind[**pixel]).count();
-        behind as f64 >= evidence.settings.removal_share * self.pixels.len() as f64
+        let free = self.free(evidence.rasters);
+        let behind = free.iter().filter(|pixel| evidence.shows_behind[**pixel]).count();
+        free.len() as f64 >= MIN_FREE * self.pixels.len() as f64
+            && behind as f64 >= evidence.settings.removal_share * free.len() as f64
             && !self.is_still_there(evidence.settings)
     }
 

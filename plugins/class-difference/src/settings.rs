@@ -29,7 +29,7 @@ pub const SCHEMA: &str = r#"{
       "description": "largest hole that is filled, share of its region" },
     "min_sure_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.75,
       "description": "share of a material region's pixels that no pose error explains, at least" },
-    "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.5,
+    "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.75,
       "description": "a descriptor is still there when the photo shows its class on this share of its pixels" },
     "removal_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.7,
       "description": "a descriptor is gone when the photo shows what is behind on this share of its pixels" }
