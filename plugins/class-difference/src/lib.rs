@@ -10,6 +10,7 @@
 pub mod components;
 pub mod detector;
 pub mod hidden;
+pub mod judge;
 pub mod pairs;
 pub mod raster;
 pub mod realign;

@@ -20,6 +20,9 @@ const MAX_SHIFT: f64 = 4.0;
 /// Share of its pixels that show another class than its own, at least, to judge by.
 const MIN_FREE: f64 = 0.4;
 
+/// From this share of its pixels on that show its class, at its best shift, it may still be there.
+const DOUBTFUL: f64 = 0.5;
+
 /// What there is to judge by.
 pub struct Evidence<'a> {
     /// Photo and view.
@@ -78,8 +81,14 @@ impl Seen {
 
     /// Whether the photo shows what is behind it instead. Where it shows the descriptor's own class after all, another
     /// of its kind stands in front.
-    pub fn is_gone(&self, evidence: &Evidence<'_>) -> bool {
+    /// Where much of it still seems to be there, that must be `claimed` by something new.
+    pub fn is_gone(&self, evidence: &Evidence<'_>, claimed: &[bool]) -> bool {
         let free = self.free(evidence.rasters);
+        let covered = || self.pixels.iter().filter(|pixel| evidence.rasters.photo[**pixel] == self.class);
+        let is_replaced = covered().filter(|pixel| claimed[**pixel]).count() * 2 >= covered().count();
+        if self.still_share >= DOUBTFUL && !is_replaced {
+            return false;
+        }
         let behind = free.iter().filter(|pixel| evidence.shows_behind[**pixel]).count();
         free.len() as f64 >= MIN_FREE * self.pixels.len() as f64
             && behind as f64 >= evidence.settings.removal_share * free.len() as f64
