@@ -30,6 +30,7 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         resurvey_semantic::plugin(),
         resurvey_skyline::plugin(),
         resurvey_class_difference::plugin(),
+        resurvey_aligned::plugin(),
         resurvey_descriptors::plugin(),
     ] {
         registry.add_builtin(declaration)?;

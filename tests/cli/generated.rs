@@ -12,6 +12,7 @@ fn the_built_in_plugins_are_listed_with_the_documented_keys() {
         ("semantic", "matcher"),
         ("skyline", "matcher"),
         ("class-difference", "detector"),
+        ("aligned", "detector"),
         ("descriptors", "estimator"),
     ] {
         let plugin = plugins.iter().find(|plugin| plugin["name"] == name).unwrap();

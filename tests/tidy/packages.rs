@@ -20,10 +20,11 @@ pub fn metadata() -> Value {
 }
 
 /// The arrows of `docs/architecture.md`: package, and the packages of this workspace that it is built from.
-pub const ARROWS: [(&str, &[&str]); 9] = [
+pub const ARROWS: [(&str, &[&str]); 10] = [
     (
         "resurvey",
         &[
+            "resurvey-aligned",
             "resurvey-class-difference",
             "resurvey-core",
             "resurvey-descriptors",
@@ -32,6 +33,7 @@ pub const ARROWS: [(&str, &[&str]); 9] = [
             "resurvey-skyline",
         ],
     ),
+    ("resurvey-aligned", &["resurvey-class-difference", "resurvey-plugin"]),
     ("resurvey-class-difference", &["resurvey-plugin"]),
     ("resurvey-core", &["resurvey-schema"]),
     ("resurvey-descriptors", &["resurvey-plugin"]),
