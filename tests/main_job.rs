@@ -86,7 +86,7 @@ fn a_photo_from_another_pose_of_what_has_changed_changes_nothing() {
 #[test]
 fn a_chair_that_was_moved_is_one_modification() {
     let place = Place::new(Scene::new(SceneKind::Hall, 7), "3ds");
-    let (case, capture) = place.capture(ChangeKind::ChairMoved, NoiseLevel::LIGHT, 5);
+    let (case, capture) = place.capture(ChangeKind::ChairMoved, NoiseLevel::LIGHT, 7_000_023);
     let answer = place.run("update", &[path(&capture)]);
     assert_eq!(answer.code, 0, "{}", answer.messages);
     let changes = answer.json["changes"].as_array().unwrap();
