@@ -1,0 +1,203 @@
+//! Rates of the store: `cargo bench -p resurvey-core --bench store`, with numbers of features for those sizes alone
+//! (`-- 200000`), or `-- --full` for 1 and 10 million (an hour and 8 GB of disk).
+//!
+//! Medians of 101 warm runs. The temporary directory should be on the disk that is to be measured.
+
+#[path = "store/banners.rs"]
+mod banners;
+#[path = "store/plain.rs"]
+mod plain;
+#[path = "store/writers.rs"]
+mod writers;
+
+use banners::{Random, new_map, now, side_m, square, transaction};
+use plain::Plain;
+use resurvey_core::store::MapFile;
+use resurvey_core::version::{BoxMm, Delta, Feature, FeatureState, Fid, VersionId};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const RUNS: usize = 101;
+/// A transaction holds its features in memory.
+const LOADED_AT_ONCE: usize = 500_000;
+const HOT_VERSIONS: u64 = 10_000;
+const CHANGES: usize = 20;
+/// Of the changes of a version, those in the hot square.
+const HOT_SHARE: f64 = 0.9;
+const WRITER_SECONDS: u64 = 10;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some((writers::WRITER, rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
+        return writers::write(rest);
+    }
+    let mut sizes: Vec<usize> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
+    if sizes.is_empty() {
+        sizes.push(1_000_000);
+        sizes.extend(arguments.iter().any(|argument| argument == "--full").then_some(10_000_000));
+    }
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    println!("a write of 4 KiB and its sync alone: {}", ms(sync(directory.path())));
+    for features in sizes {
+        measure(directory.path(), features);
+    }
+    println!("\ncommits of several processes to an empty map");
+    for processes in [1, 8] {
+        writers::measure(directory.path(), processes, WRITER_SECONDS);
+    }
+}
+
+/// A map while it is measured.
+struct Bench {
+    map: MapFile,
+    random: Random,
+    side_m: f64,
+    head: VersionId,
+}
+
+fn measure(directory: &Path, features: usize) {
+    println!("\n{features} features");
+    let map = new_map(&directory.join(format!("{features}.rsv")));
+    let mut bench = Bench { map, random: Random(7), side_m: side_m(features), head: VersionId(0) };
+    bench.load(features);
+    let first = bench.head;
+    let elsewhere = square(bench.side_m, 0.25, 100.0);
+    bench.region("100 m", &elsewhere, first);
+    bench.commits();
+    bench.hot_spot();
+    let hot = square(bench.side_m, 0.5, 100.0);
+    let middle = VersionId(u64::midpoint(first.0, bench.head.0));
+    println!("  after {HOT_VERSIONS} versions of {CHANGES} changes, {:.0} % of them in one 100 m", HOT_SHARE * 100.0);
+    let plain = Plain::copy_of(bench.map.path(), &directory.join(format!("{features}-plain.db")));
+    for version in [first, middle, bench.head] {
+        bench.region("100 m elsewhere", &elsewhere, version);
+        bench.beside(&plain, &hot, version);
+    }
+    for side in [50.0, 100.0] {
+        let region = square(bench.side_m, 0.5, side);
+        let (time, rows) = median(|| bench.map.changes_in(first, bench.head, &region).expect("changes").len());
+        println!("    difference of the hot {side} m over {HOT_VERSIONS} versions: {} for {rows} deltas", ms(time));
+    }
+    let (time, rows) = median(|| bench.map.changes_in(first, bench.head, &elsewhere).expect("changes").len());
+    println!("    difference of 100 m elsewhere: {} for {rows} deltas", ms(time));
+}
+
+impl Bench {
+    fn load(&mut self, features: usize) {
+        let mut seconds = 0.0;
+        for start in (0..features).step_by(LOADED_AT_ONCE) {
+            let mut load = transaction(self.head);
+            let count = LOADED_AT_ONCE.min(features - start);
+            load.additions = (0..count).map(|_| self.random.banner(self.side_m)).collect();
+            let start = Instant::now();
+            self.head = self.map.commit(&load, now()).expect("a commit");
+            seconds += start.elapsed().as_secs_f64();
+        }
+        let each = self.bytes() as f64 / features as f64;
+        println!("  bulk load: {:.0} features/s, {each:.0} B each", features as f64 / seconds);
+    }
+
+    fn commits(&mut self) {
+        let before = self.bytes();
+        let (time, _) = median(|| {
+            let mut update = transaction(self.head);
+            update.additions = (0..10).map(|_| self.random.banner(self.side_m)).collect();
+            self.head = self.map.commit(&update, now()).expect("a commit");
+            0
+        });
+        let growth = (self.bytes() - before) as f64 / (10 * RUNS) as f64;
+        println!("  commit of 10 new ones, synced: {}, {growth:.0} B each", ms(time));
+    }
+
+    /// Commits [`HOT_VERSIONS`], most of whose changes lie in the same 100 m.
+    fn hot_spot(&mut self) {
+        let before = self.bytes();
+        let live = |region: &BoxMm| -> Vec<(Fid, FeatureState)> {
+            let found = self.map.snapshot(self.head).and_then(|snapshot| snapshot.features_in(region));
+            found.expect("features").into_iter().map(|Feature { fid, state, .. }| (fid, state)).collect()
+        };
+        let mut hot = live(&square(self.side_m, 0.5, 100.0));
+        let mut cold = live(&square(self.side_m, 0.1, 500.0));
+        let in_hot: BTreeSet<Fid> = hot.iter().map(|(fid, _)| *fid).collect();
+        cold.retain(|(fid, _)| !in_hot.contains(fid));
+        let mut seconds = 0.0;
+        for _ in 0..HOT_VERSIONS {
+            let mut update = transaction(self.head);
+            while update.deltas.len() < CHANGES {
+                let place = if self.random.next() < HOT_SHARE { &mut hot } else { &mut cold };
+                let which = self.random.index(place.len());
+                let (fid, state) = &mut place[which];
+                if update.deltas.iter().all(|delta| delta.fid() != *fid) {
+                    let after = self.random.measured_again(state);
+                    update.deltas.push(Delta::modify(*fid, std::mem::replace(state, after.clone()), after));
+                }
+            }
+            let start = Instant::now();
+            self.head = self.map.commit(&update, now()).expect("a commit");
+            seconds += start.elapsed().as_secs_f64();
+        }
+        let growth = (self.bytes() - before) as f64 / (HOT_VERSIONS as usize * CHANGES) as f64;
+        println!("  hot spot: {:.0} commits/s, {growth:.0} B a change", HOT_VERSIONS as f64 / seconds);
+    }
+
+    fn features_in(&self, region: &BoxMm, version: VersionId) -> usize {
+        self.map.snapshot(version).and_then(|snapshot| snapshot.features_in(region)).expect("features").len()
+    }
+
+    fn region(&self, name: &str, region: &BoxMm, version: VersionId) {
+        let (time, rows) = median(|| self.features_in(region, version));
+        println!("    {name} at version {}: {} for {rows} rows", version.0, ms(time));
+    }
+
+    /// The hot square, here and in the obvious design; they must find the same.
+    fn beside(&self, plain: &Plain, hot: &BoxMm, version: VersionId) {
+        let (time, rows) = median(|| self.features_in(hot, version));
+        let (obvious, expected) = median(|| plain.features_in(hot, version));
+        assert_eq!(rows, expected, "both designs find the same");
+        println!(
+            "    hot 100 m at version {}: {} for {rows} rows; 3-D R*Tree with version filter {}, {:.0} times as long",
+            version.0,
+            ms(time),
+            ms(obvious),
+            obvious.as_secs_f64() / time.as_secs_f64()
+        );
+    }
+
+    /// Size of the map when its log is written back.
+    fn bytes(&self) -> u64 {
+        let connection = rusqlite::Connection::open(self.map.path()).expect("the map opens");
+        connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).expect("a checkpoint");
+        std::fs::metadata(self.map.path()).expect("the map").len()
+    }
+}
+
+/// Median of [`RUNS`], and what the last run found.
+fn median(mut run: impl FnMut() -> usize) -> (Duration, usize) {
+    let mut found = 0;
+    let mut times: Vec<Duration> = (0..RUNS)
+        .map(|_| {
+            let start = Instant::now();
+            found = run();
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    (times[RUNS / 2], found)
+}
+
+/// Median time of the least that a synced commit can do.
+fn sync(directory: &Path) -> Duration {
+    let mut file = File::create(directory.join("sync")).expect("a file");
+    let write = || {
+        file.write_all(&[7; 4096]).and_then(|()| file.sync_data()).expect("a synced write");
+        0
+    };
+    median(write).0
+}
+
+fn ms(time: Duration) -> String {
+    format!("{:.2} ms", time.as_secs_f64() * 1e3)
+}
