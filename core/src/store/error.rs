@@ -2,7 +2,7 @@
 
 use crate::version::{Digest, Fid, InvalidRevision, VersionId};
 use jiff::Timestamp;
-use rusqlite::ErrorCode;
+use rusqlite::{ErrorCode, ffi};
 use std::path::{Path, PathBuf};
 
 /// Why the map could not answer.
@@ -236,9 +236,8 @@ fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
             ErrorCode::CannotOpen => {
                 StoreError::NoWriteAheadLog { path, detail: format!("it cannot be made ({detail})") }
             }
-            ErrorCode::SystemIoFailure | ErrorCode::PermissionDenied | ErrorCode::NoLargeFileSupport => {
-                StoreError::Io { path, detail }
-            }
+            ErrorCode::SystemIoFailure => StoreError::Io { path, detail: refused_by_disk(failure.extended_code) },
+            ErrorCode::PermissionDenied | ErrorCode::NoLargeFileSupport => StoreError::Io { path, detail },
             // "no such table", and vtab complaints about missing shadow rows.
             _ if detail.contains("no such") => StoreError::Damaged { path, detail },
             _ => StoreError::Internal { path, detail },
@@ -249,5 +248,41 @@ fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
         | rusqlite::Error::Utf8Error(..)
         | rusqlite::Error::QueryReturnedNoRows => StoreError::Damaged { path, detail },
         _ => StoreError::Internal { path, detail },
+    }
+}
+
+/// What the disk did not do, and what became of the map: of a version that is written when the disk fails, the log may
+/// hold all or not.
+fn refused_by_disk(extended_code: i32) -> String {
+    let (refused, is_write) = match extended_code {
+        ffi::SQLITE_IOERR_READ | ffi::SQLITE_IOERR_SHORT_READ => ("a read", false),
+        ffi::SQLITE_IOERR_WRITE => ("a write", true),
+        ffi::SQLITE_IOERR_FSYNC | ffi::SQLITE_IOERR_DIR_FSYNC => ("a sync", true),
+        ffi::SQLITE_IOERR_TRUNCATE => ("to change the length of a file", true),
+        ffi::SQLITE_IOERR_SHMSIZE | ffi::SQLITE_IOERR_SHMOPEN | ffi::SQLITE_IOERR_SHMMAP => {
+            ("the shared memory beside the map", true)
+        }
+        _ => ("an operation", true),
+    };
+    let then = "; the map is whole, \"resurvey log\" says whether it has the new version";
+    format!("disk I/O error {extended_code}: the disk refused {refused}{}", if is_write { then } else { "" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disk_that_fails_is_told_with_what_it_refused_and_where_to_look() {
+        // The codes are SQLite's: https://sqlite.org/rescode.html.
+        let said = |code| {
+            let error = rusqlite::Error::SqliteFailure(ffi::Error::new(code), None);
+            Fault::Sql(error).at(Path::new("city.rsv")).to_string()
+        };
+        assert_eq!(said(266), "city.rsv: disk I/O error 266: the disk refused a read");
+        for (code, refused) in [(778, "a write"), (1034, "a sync"), (1546, "to change the length of a file")] {
+            let words = format!("city.rsv: disk I/O error {code}: the disk refused {refused}; the map is whole, ");
+            assert!(said(code).starts_with(&words) && said(code).contains("resurvey log"), "{}", said(code));
+        }
     }
 }
