@@ -1,8 +1,8 @@
 //! Rates of the store: `cargo bench -p resurvey-core --bench store`, with numbers of features for those sizes alone
 //! (`-- 200000`), or `-- --full` for 1 and 10 million (an hour and 8 GB of disk).
 //!
-//! Medians of 101 warm runs, by the clock and on a processor; the latter is what counts where others use the machine
-//! too. The temporary directory should be on the disk that is to be measured.
+//! Medians of 101 warm runs by the clock, and means on a processor, which count where others use the machine too. The
+//! temporary directory should be on the disk that is to be measured.
 
 #[path = "store/banners.rs"]
 mod banners;
@@ -186,7 +186,7 @@ fn cpu_s() -> f64 {
     text.split(' ').next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(f64::NAN) / 1e9
 }
 
-/// Medians of the time by the clock and of that on a processor.
+/// Median time by the clock, and mean on a processor: the system counts that in steps too long for a single run.
 struct Times {
     wall_s: f64,
     cpu_s: f64,
@@ -198,18 +198,16 @@ impl fmt::Display for Times {
     }
 }
 
-/// Medians of `runs`, and what the last run found.
+/// Times of `runs`, and what the last one found.
 fn median(runs: usize, mut run: impl FnMut() -> usize) -> (Times, usize) {
-    let (mut wall_s, mut on_cpu_s, mut found) = (Vec::new(), Vec::new(), 0);
+    let (mut wall_s, mut found, cpu_start) = (Vec::new(), 0, cpu_s());
     for _ in 0..runs {
-        let (start, cpu_start) = (Instant::now(), cpu_s());
+        let start = Instant::now();
         found = run();
         wall_s.push(start.elapsed().as_secs_f64());
-        on_cpu_s.push(cpu_s() - cpu_start);
     }
     wall_s.sort_by(f64::total_cmp);
-    on_cpu_s.sort_by(f64::total_cmp);
-    (Times { wall_s: wall_s[runs / 2], cpu_s: on_cpu_s[runs / 2] }, found)
+    (Times { wall_s: wall_s[runs / 2], cpu_s: (cpu_s() - cpu_start) / runs as f64 }, found)
 }
 
 /// Median time of the least that a synced commit can do.
