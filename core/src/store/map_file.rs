@@ -186,9 +186,15 @@ impl MapFile {
         connection.busy_timeout(BUSY_TIMEOUT)?;
         connection.set_prepared_statement_cache_capacity(64);
         connection.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
-        for (pragma, value) in
-            [("foreign_keys", 1), ("cell_size_check", 1), ("trusted_schema", 0), ("cache_size", -CACHE_KIB)]
-        {
+        // A transaction is in memory anyway; pages that leave the cache before its end would be written many times.
+        let pragmas = [
+            ("foreign_keys", 1),
+            ("cell_size_check", 1),
+            ("trusted_schema", 0),
+            ("cache_size", -CACHE_KIB),
+            ("cache_spill", 0),
+        ];
+        for (pragma, value) in pragmas {
             connection.pragma_update(None, pragma, value)?;
         }
         connection.pragma_update(None, "synchronous", "FULL")?;
