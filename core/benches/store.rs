@@ -1,5 +1,5 @@
 //! Rates of the store: `cargo bench -p resurvey-core --bench store`, with numbers of features for those sizes alone
-//! (`-- 200000`), or `-- --full` for 1 and 10 million (an hour and 8 GB of disk).
+//! (`-- 200000`), or `-- --full` for 1 and 10 million (long, and 8 GB of disk).
 //!
 //! Medians of 101 warm runs by the clock, and means on a processor, which count where others use the machine too. The
 //! temporary directory should be on the disk that is to be measured.
