@@ -36,12 +36,13 @@ const PRIOR: [&str; 11] = [
     "notes",
 ];
 
-const LOCALIZATION: [&str; 14] = [
+const LOCALIZATION: [&str; 15] = [
     "pose",
     "latitude",
     "longitude",
     "score",
     "covariance",
+    "alignment",
     "reliable",
     "reasons",
     "gates",
@@ -151,11 +152,24 @@ fn a_pose_that_is_found_can_be_written_and_read_again() {
         assert_eq!(keys(gate), ["name", "measured", "limit", "unit", "passed"]);
     }
     assert_eq!(document["covariance"].as_array().map(Vec::len), Some(3));
+    assert_eq!(keys(&document["alignment"]), ["covariance", "map_sigma_m", "label_sigma_px"]);
+    assert_eq!(document["alignment"]["covariance"].as_array().map(Vec::len), Some(6));
     let written: Value = serde_json::from_slice(&std::fs::read(&found).unwrap()).unwrap();
     assert_eq!(written, document);
     let out = bench.path("view");
     bench.run("render", &["--pose", text(&found), "--out", text(&out)]).ok();
     assert!(out.join("view.json").exists());
+    // The pose is then as sure as the document says, and not exact.
+    let updated = bench.json("update", &[text(&capture), "--dry-run", "--pose", text(&found)]);
+    assert_eq!(updated["localization"]["covariance"], document["covariance"]);
+    assert_eq!(updated["localization"]["alignment"], document["alignment"]);
+    let mut unsure = document.clone();
+    unsure["covariance"][0][0] = json!(-1.0);
+    let negative = bench.path("negative.json");
+    std::fs::write(&negative, unsure.to_string()).unwrap();
+    bench
+        .run("update", &[text(&capture), "--dry-run", "--pose", text(&negative)])
+        .refused(10, &["negative.json", "variances of at least 0", "found -1"]);
     let nowhere = bench.path("no/such/pose.json");
     bench
         .run("localize", &[text(&capture), "--set", "semantic.radius_m=2", "--out", text(&nowhere)])

@@ -28,6 +28,8 @@ const SAME_OBJECT_SHARE: f64 = 1.0;
 const MOVE_REACH_M: f64 = 2.5;
 /// One that moved by less stayed, metres: 1 m of range is 4 px at 10 m.
 const LEAST_MOVE_M: f64 = 0.25;
+/// So does one that is seen to be gone from its place but moved by fewer 1σ of the difference.
+const MOVE_SIGMAS: f64 = 2.0;
 
 /// One change of the map.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,9 +201,9 @@ impl Resolver<'_> {
             }
             let Some((moved_m, index, at)) = nearest else { break };
             let (Some((region, object)), (fid, before)) = (objects[index].take(), gone.swap_remove(at)) else { break };
-            let size_m = SAME_OBJECT_SHARE * object.size_m[0].min(object.size_m[1]);
-            // That it is seen to be gone from its place speaks for a move, so the least one is enough.
-            let limit_m = move_limit_m(before.sigma(), object.sigma, size_m).min(size_m / 2.0);
+            // That it is seen to be gone from its place speaks for a move, so two sigmas are enough.
+            let sigma_m = |sigma: Option<Uncertainty>| sigma.map_or(0.0, |sigma| sigma.position_m);
+            let limit_m = LEAST_MOVE_M.max(MOVE_SIGMAS * sigma_m(before.sigma()).hypot(sigma_m(object.sigma)));
             if moved_m > limit_m {
                 let after = Descriptor::Dynamic(object);
                 self.resolution.changes.push(Change::Modify { fid, before, after });
