@@ -1,16 +1,10 @@
 //! What the map has behind the nearest surface.
 
-use crate::sample::offset_from;
 use resurvey_class_difference::raster::Rasters;
+use resurvey_class_difference::uncovered;
 use resurvey_plugin::schema::{ChangeRegion, ClassId};
 use resurvey_plugin::{Comparison, Error, Host};
 
-/// Surfaces behind the nearest that are looked at.
-const LAYERS: usize = 4;
-/// Farthest surface behind, metres.
-const LIMIT_M: f64 = 500.0;
-/// How far behind a surface the next one is looked for, metres.
-const SKIP_M: f64 = 0.02;
 /// Pixels of a region looked at, at most.
 const SAMPLES: usize = 96;
 /// Share of them that lie on a surface that is not there and show what is behind it.
@@ -57,14 +51,5 @@ pub fn has_behind(
     let pose = &comparison.estimate.pose;
     let centre = [(pixel % rasters.width) as f64 + 0.5, (pixel / rasters.width) as f64 + 0.5];
     let Some(ray) = host.pixel_rays(pose, &[centre])?.into_iter().next() else { return Ok(false) };
-    let mut gone_m = f64::from(rasters.range_m[pixel]) + SKIP_M;
-    for _ in 0..LAYERS {
-        let origin = offset_from(pose.position, ray.map(|part| part * gone_m));
-        match host.cast_rays(origin, &[ray], LIMIT_M, false)?.into_iter().next().flatten() {
-            Some(hit) if hit.class == class => return Ok(true),
-            Some(hit) => gone_m += hit.range_m + SKIP_M,
-            None => return Ok(false),
-        }
-    }
-    Ok(false)
+    uncovered::has_behind(host, pose, ray, f64::from(rasters.range_m[pixel]), class)
 }

@@ -31,7 +31,7 @@ pub const SCHEMA: &str = r#"{
       "description": "largest hole that is filled, share of its region" },
     "min_sure_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.75,
       "description": "share of a material region's pixels that no pose error explains, at least" },
-    "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.5,
+    "still_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.75,
       "description": "a descriptor is still there when the photo shows its class on this share of its pixels" },
     "removal_share": { "type": "number", "minimum": 0, "maximum": 1, "default": 0.7,
       "description": "a descriptor is gone when the photo shows what is behind on this share of its pixels" }
@@ -74,6 +74,23 @@ impl Settings {
             min_sure_share: self.min_sure_share,
             still_share: self.still_share,
             removal_share: self.removal_share,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SCHEMA;
+    use serde_json::Value;
+
+    #[test]
+    fn a_setting_that_class_difference_has_too_is_the_same_there() {
+        let properties = |schema: &str| serde_json::from_str::<Value>(schema).unwrap()["properties"].clone();
+        let (own, other) = (properties(SCHEMA), properties(resurvey_class_difference::settings::SCHEMA));
+        let shared: Vec<&String> = other.as_object().unwrap().keys().filter(|name| *name != "profile").collect();
+        assert!(shared.len() > 5);
+        for name in shared {
+            assert_eq!(own[name], other[name], "{name}");
         }
     }
 }

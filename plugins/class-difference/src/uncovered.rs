@@ -47,8 +47,8 @@ pub fn is_uncovered(
     Ok(behind >= enough)
 }
 
-/// Whether `class` is on one of the surfaces behind the first along `ray`.
-fn has_behind(host: &dyn Host, pose: &Pose, ray: [f64; 3], range_m: f64, class: ClassId) -> Result<bool, Error> {
+/// Whether the map has `class` on one of the surfaces behind the first, which is `range_m` away, along the unit `ray`.
+pub fn has_behind(host: &dyn Host, pose: &Pose, ray: [f64; 3], range_m: f64, class: ClassId) -> Result<bool, Error> {
     let mut gone_m = range_m + SKIP_M;
     for _ in 0..LAYERS {
         let GridPoint { easting_m, northing_m, height_m } = pose.position;
