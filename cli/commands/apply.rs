@@ -5,7 +5,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use jiff::Timestamp;
 use resurvey_core::mesh::decode_mesh;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::read_change_set;
 use serde_json::json;
 use std::io::Read;

@@ -3,7 +3,7 @@
 use crate::args::Changes;
 use crate::console::Console;
 use crate::failure::Failure;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{VersionId, write_change_set};
 use resurvey_schema::changes::{ChangeSetHeader, FORMAT};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use std::collections::btree_map::Entry;
 pub fn run(options: &Changes, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open_read_only(&options.map)?;
     let (from, to) = map.resolve_range(&options.range)?;
-    let deltas = map.changes(from, to)?;
+    let deltas = map.changes(from, to, None)?;
     let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
     let header = header(&map, from, to)?;
     let mut geometries = BTreeMap::new();

@@ -7,7 +7,7 @@ use crate::document;
 use crate::failure::Failure;
 use crate::region;
 use resurvey_core::crs::Crs;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{Delta, FeatureState, Fid};
 use resurvey_schema::{ClassTable, Descriptor};
 use serde_json::{Value, json};
@@ -17,10 +17,8 @@ pub fn run(options: &Diff, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open_read_only(&options.map)?;
     let (from, to) = map.resolve_range(&options.range)?;
     let crs = crs_of(&map)?;
-    let deltas = match region::bbox(&options.region, crs, false)? {
-        Some(bounds) => map.changes_in(from, to, &bounds)?,
-        None => map.changes(from, to)?,
-    };
+    let bounds = region::bbox(&options.region, crs, false)?;
+    let deltas = map.changes(from, to, bounds.as_ref())?;
     let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
     let sides = Sides { before: before.classes(), after: after.classes() };
     match if console.is_json() { DiffFormat::Json } else { options.format } {

@@ -5,7 +5,7 @@ use crate::commands::localize::pose_text;
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
-use resurvey_core::store::{MapFile, Provenance, RecordedObservation};
+use resurvey_core::store::{History, MapFile, Provenance, RecordedObservation};
 use resurvey_core::version::{Fid, Observation, VersionId};
 use resurvey_schema::ClassTable;
 use serde_json::{Value, json};

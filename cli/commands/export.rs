@@ -7,7 +7,7 @@ use crate::failure::{Failure, MAP};
 use crate::region;
 use resurvey_core::export::{ExportScene, Mark, glb, gltf};
 use resurvey_core::mesh::{Object, decode_mesh};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{BoxMm, Delta, FeatureState, VersionId};
 use resurvey_schema::Descriptor;
 use serde_json::json;
@@ -67,10 +67,9 @@ struct Things {
 }
 
 impl Things {
-    fn add_version(&mut self, map: &MapFile, at: VersionId, bounds: Option<&BoxMm>) -> Result<VersionId, Failure> {
+    fn add_version(&mut self, map: &impl History, at: VersionId, bounds: Option<&BoxMm>) -> Result<VersionId, Failure> {
         let snapshot = map.snapshot(at)?;
-        let features = bounds.map_or_else(|| snapshot.features(), |bounds| snapshot.features_in(bounds))?;
-        for feature in features {
+        for feature in snapshot.features(bounds)? {
             self.add(map, feature.fid.0, feature.state)?;
         }
         Ok(at)
@@ -80,15 +79,11 @@ impl Things {
     /// has every class of the earlier one.
     fn add_difference(
         &mut self,
-        map: &MapFile,
+        map: &impl History,
         (from, to): (VersionId, VersionId),
         bounds: Option<&BoxMm>,
     ) -> Result<VersionId, Failure> {
-        let deltas = match bounds {
-            Some(bounds) => map.changes_in(from, to, bounds)?,
-            None => map.changes(from, to)?,
-        };
-        for delta in deltas {
+        for delta in map.changes(from, to, bounds)? {
             let fid = delta.fid().0;
             let mark = match (delta.before(), delta.after()) {
                 (None, _) => Mark::Added,
@@ -104,7 +99,7 @@ impl Things {
         Ok(from.max(to))
     }
 
-    fn add(&mut self, map: &MapFile, fid: u64, state: FeatureState) -> Result<(), Failure> {
+    fn add(&mut self, map: &impl History, fid: u64, state: FeatureState) -> Result<(), Failure> {
         match state {
             FeatureState::Descriptor(descriptor) => self.descriptors.push((fid, descriptor)),
             FeatureState::Object { name, geometry, .. } => {

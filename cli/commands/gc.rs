@@ -4,7 +4,7 @@ use crate::args::Gc;
 use crate::console::Console;
 use crate::failure::Failure;
 use jiff::Timestamp;
-use resurvey_core::store::{Forgetting, MapFile};
+use resurvey_core::store::{Forgetting, History, MapFile};
 use resurvey_core::version::VersionId;
 use serde_json::json;
 use std::path::Path;

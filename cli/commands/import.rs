@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use resurvey_core::crs::{Crs, LocalOrigin};
 use resurvey_core::image::LabelReading;
 use resurvey_core::mesh::{ClassMap, ImportOptions, Imported, Object, Up, encode_mesh, import_model};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{BoxMm, FeatureState, UpdateTransaction, VersionKind};
 use resurvey_schema::{ClassTable, GridPoint};
 use serde_json::json;

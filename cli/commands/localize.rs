@@ -9,7 +9,7 @@ use crate::prior::{Placed, read_placed};
 use crate::tools::{Choices, load, registry};
 use resurvey_core::capture::read_pose;
 use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_schema::Pose;
 use serde_json::{Map, json};
 use std::path::Path;

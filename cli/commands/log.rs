@@ -7,7 +7,7 @@ use crate::document;
 use crate::failure::Failure;
 use crate::region;
 use comfy_table::{Table, presets};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{Fid, VersionRecord};
 use serde_json::json;
 
@@ -18,8 +18,7 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
     let mut records: Vec<VersionRecord> = match (options.fid, bounds) {
         (Some(_), Some(_)) => return Err(Failure::usage("expected a feature id or a region, found both")),
         (Some(fid), None) => map.log_of(Fid(fid))?,
-        (None, Some(bounds)) => map.log_in(&bounds)?,
-        (None, None) => map.log()?,
+        (None, bounds) => map.log(bounds.as_ref())?,
     };
     records.truncate(options.limit.unwrap_or(usize::MAX));
     if console.is_json() {

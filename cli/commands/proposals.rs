@@ -7,7 +7,7 @@ use crate::console::Console;
 use crate::failure::{CONFLICT, Failure};
 use comfy_table::{Table, presets};
 use jiff::Timestamp;
-use resurvey_core::store::{MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot};
+use resurvey_core::store::{History, MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot};
 use resurvey_core::update::in_the_way;
 use resurvey_core::version::{BoxMm, Delta, FeatureState, Fid};
 use resurvey_schema::{ClassTable, Descriptor};
@@ -121,7 +121,7 @@ fn refuse_what_is_there(map: &MapFile, proposal: &Proposal) -> Result<(), Failur
 }
 
 fn descriptors_near(snapshot: &Snapshot<'_>, bounds: &BoxMm) -> Result<Vec<(u64, Descriptor)>, Failure> {
-    let features = snapshot.features_in(bounds)?.into_iter();
+    let features = snapshot.features(Some(bounds))?.into_iter();
     let descriptor = |feature: resurvey_core::version::Feature| match feature.state {
         FeatureState::Descriptor(descriptor) => Some((feature.fid.0, descriptor)),
         FeatureState::Object { .. } => None,

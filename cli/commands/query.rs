@@ -8,7 +8,7 @@ use crate::failure::{Failure, MISSING};
 use crate::region::{self, Shape};
 use comfy_table::{Table, presets};
 use resurvey_core::crs::Crs;
-use resurvey_core::store::{MapFile, Snapshot};
+use resurvey_core::store::{History, MapFile, Snapshot};
 use resurvey_core::version::{Feature, FeatureState};
 use resurvey_schema::{ClassTable, Descriptor, GridPoint};
 use serde_json::{Map, Value, json};
@@ -62,11 +62,9 @@ fn features(options: &Query, snapshot: &Snapshot<'_>, crs: Crs) -> Result<Vec<Fe
         Some(shape) => Some(region::around(&shape.outline(), region::checked_heights(&options.region)?)?),
         None => region::bbox(&options.region, crs, options.wgs84)?,
     };
-    let found = match (bounds, options.observed_at) {
-        (Some(bounds), Some(time)) => snapshot.features_observed_in(time, &bounds)?,
-        (None, Some(time)) => snapshot.features_observed(time)?,
-        (Some(bounds), None) => snapshot.features_in(&bounds)?,
-        (None, None) => snapshot.features()?,
+    let found = match options.observed_at {
+        Some(time) => snapshot.features_observed(time, bounds.as_ref())?,
+        None => snapshot.features(bounds.as_ref())?,
     };
     let wanted = |feature: &Feature| {
         let class = feature.state.class().map(|class| snapshot.classes().name(class));

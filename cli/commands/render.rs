@@ -9,7 +9,7 @@ use resurvey_core::camera::Camera;
 use resurvey_core::capture::read_pose;
 use resurvey_core::image::{Raster, write_grey16_png, write_label_png};
 use resurvey_core::render::{lidar, view};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::update::world_around;
 use resurvey_schema::CameraFile;
 use serde_json::json;

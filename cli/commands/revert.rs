@@ -6,7 +6,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::region;
 use jiff::Timestamp;
-use resurvey_core::store::{self, MapFile};
+use resurvey_core::store::{self, History, MapFile};
 use serde_json::json;
 
 /// Undoes one version by a new one.

@@ -6,7 +6,7 @@ use super::update::{Committed, Outcome, Run, message_of};
 use crate::failure::Failure;
 use jiff::Timestamp;
 use resurvey_core::capture::Capture;
-use resurvey_core::store::{MapFile, StoreError};
+use resurvey_core::store::{History, MapFile, StoreError};
 use resurvey_core::update::{Change, Confirmation, add_changes, confirm, testimonies};
 use resurvey_core::version::{Decision, Digest, Observation, UpdateTransaction, VersionId, VersionKind};
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@ use crate::args::Tag;
 use crate::console::Console;
 use crate::failure::Failure;
 use jiff::Timestamp;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use serde_json::json;
 
 /// Names a version, takes a name away, or lists the names.

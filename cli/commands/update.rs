@@ -16,7 +16,7 @@ use resurvey_core::crs::Crs;
 use resurvey_core::localize::{GateLimits, Located, SceneServices, World, localize};
 use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
 use resurvey_core::render::{inside_solid, view};
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
     BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,

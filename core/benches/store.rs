@@ -13,7 +13,7 @@ mod writers;
 
 use banners::{Random, new_map, now, side_m, square, transaction};
 use plain::Plain;
-use resurvey_core::store::MapFile;
+use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{BoxMm, Delta, Feature, FeatureState, Fid, VersionId};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -82,10 +82,10 @@ fn measure(directory: &Path, features: usize) {
     let here = versions.map(|version| bench.region("hot 100 m", &hot, version));
     for side in [50.0, 100.0] {
         let region = square(bench.side_m, 0.5, side);
-        let (time, rows) = median(RUNS, || bench.map.changes_in(first, bench.head, &region).expect("changes").len());
+        let (time, rows) = median(RUNS, || bench.map.changes(first, bench.head, Some(&region)).expect("changes").len());
         println!("    difference of the hot {side} m over {HOT_VERSIONS} versions: {time} for {rows} deltas");
     }
-    let (time, rows) = median(RUNS, || bench.map.changes_in(first, bench.head, &elsewhere).expect("changes").len());
+    let (time, rows) = median(RUNS, || bench.map.changes(first, bench.head, Some(&elsewhere)).expect("changes").len());
     println!("    difference of 100 m elsewhere: {time} for {rows} deltas");
     // Last: the bundled SQLite shares one page cache among the connections of a process.
     let plain = Plain::copy_of(bench.map.path(), &directory.join(format!("{features}-plain.db")));
@@ -130,7 +130,7 @@ impl Bench {
     fn hot_spot(&mut self) {
         let before = self.bytes();
         let live = |region: &BoxMm| -> Vec<(Fid, FeatureState)> {
-            let found = self.map.snapshot(self.head).and_then(|snapshot| snapshot.features_in(region));
+            let found = self.map.snapshot(self.head).and_then(|snapshot| snapshot.features(Some(region)));
             found.expect("features").into_iter().map(|Feature { fid, state, .. }| (fid, state)).collect()
         };
         let mut hot = live(&square(self.side_m, 0.5, 100.0));
@@ -158,7 +158,7 @@ impl Bench {
     }
 
     fn features_in(&self, region: &BoxMm, version: VersionId) -> usize {
-        self.map.snapshot(version).and_then(|snapshot| snapshot.features_in(region)).expect("features").len()
+        self.map.snapshot(version).and_then(|snapshot| snapshot.features(Some(region))).expect("features").len()
     }
 
     fn region(&self, name: &str, region: &BoxMm, version: VersionId) -> (Times, usize) {

@@ -5,7 +5,7 @@ use crate::failure::{Failure, INTERNAL};
 use jiff::Timestamp;
 use resurvey_core::crs::Crs;
 use resurvey_core::mesh::{ImportOptions, import_model};
-use resurvey_core::store::{MapFile, NewMap};
+use resurvey_core::store::{History, MapFile, NewMap};
 use resurvey_core::version::{Frame, UpdateTransaction, VersionKind, read_change_set};
 use resurvey_schema::{ClassTable, GridPoint};
 use serde::Deserialize;

@@ -1,7 +1,7 @@
 //! Several processes that commit to one map at once. A writer is this program with other arguments.
 
 use super::banners::{Random, new_map, now, side_m, transaction};
-use resurvey_core::store::{CommitError, MapFile, StoreError};
+use resurvey_core::store::{CommitError, History, MapFile, StoreError};
 use resurvey_core::version::VersionId;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -72,7 +72,7 @@ pub fn measure(directory: &Path, writers: usize, seconds: u64) {
     assert_eq!(distinct.len(), made.len(), "a version was made twice");
     let head = map.head().expect("a head");
     assert_eq!(head, VersionId(made.len() as u64), "a commit was lost or doubled");
-    let features = map.snapshot(head).and_then(|snapshot| snapshot.features()).expect("features");
+    let features = map.snapshot(head).and_then(|snapshot| snapshot.features(None)).expect("features");
     assert_eq!(features.len(), ADDED * made.len(), "a feature was lost or doubled");
     assert_eq!(map.fsck(), Ok(Vec::new()));
     println!(

@@ -23,24 +23,20 @@ fn refuse<T>(error: CommitError) -> Result<T, Refused> {
     Err(WriteFault::Refused(error))
 }
 
-impl MapFile {
-    /// Makes the next version of everything in `transaction`, or refuses it and changes nothing.
-    ///
-    /// The version's time is `now`, or that of the version before where the clock went back.
-    pub fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
-        let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
-        let digest = evidence.as_ref().map(|evidence| evidence.digest);
-        self.write(|connection| {
-            if let Some(made) = made_before(connection, transaction)? {
-                return Ok(made);
-            }
-            let record = make_unseen_version(connection, transaction, digest, now)?;
-            if let Some(evidence) = evidence {
-                evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
-            }
-            Ok(record.version)
-        })
-    }
+/// Makes the next version of everything in `transaction`, or refuses it and changes nothing.
+pub(super) fn commit(map: &MapFile, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
+    let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
+    let digest = evidence.as_ref().map(|evidence| evidence.digest);
+    map.write(|connection| {
+        if let Some(made) = made_before(connection, transaction)? {
+            return Ok(made);
+        }
+        let record = make_unseen_version(connection, transaction, digest, now)?;
+        if let Some(evidence) = evidence {
+            evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
+        }
+        Ok(record.version)
+    })
 }
 
 /// Writes the next version, unless someone looked at a place that it changes since its base. An undo is not weighed
@@ -123,19 +119,13 @@ pub(super) fn make_version(
     Ok(record)
 }
 
-impl MapFile {
-    /// The version that a transaction with this idempotency key made, if there is one.
-    pub fn made_with(&self, key: &str) -> Result<Option<VersionId>, StoreError> {
-        self.read(|connection| version_with(connection, key))
-    }
-}
-
 /// The version that the same idempotency key made before.
 fn made_before(connection: &Connection, transaction: &UpdateTransaction) -> Result<Option<VersionId>, Fault> {
     transaction.idempotency_key.as_deref().map_or(Ok(None), |key| version_with(connection, key))
 }
 
-fn version_with(connection: &Connection, key: &str) -> Result<Option<VersionId>, Fault> {
+/// The version that a transaction with this idempotency key made, if there is one.
+pub(super) fn version_with(connection: &Connection, key: &str) -> Result<Option<VersionId>, Fault> {
     const SQL: &str = "SELECT version FROM version WHERE idempotency_key = :key ORDER BY version";
     let mut statement = connection.prepare_cached(SQL)?;
     let made = statement.query_row(named_params! {":key": key}, |row| row.get::<_, i64>(0)).optional()?;

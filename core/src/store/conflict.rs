@@ -5,7 +5,7 @@ use super::error::Fault;
 use super::forgotten::check_state;
 use super::index::IndexOrigin;
 use super::map_file::WriteFault;
-use super::snapshot::feature_at;
+use super::states::feature_at;
 use crate::version::{BoxMm, Delta, FeatureState, Fid, UpdateTransaction, VersionId};
 use rusqlite::{Connection, named_params};
 use std::collections::{BTreeMap, BTreeSet};

@@ -2,7 +2,7 @@
 
 use super::error::{Fault, StoreError};
 use super::map_file::format_of;
-use super::snapshot::check_version;
+use super::states::check_version;
 use crate::version::{Digest, VersionId};
 use rusqlite::{Connection, OptionalExtension, named_params};
 use std::collections::BTreeMap;

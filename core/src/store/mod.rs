@@ -1,15 +1,20 @@
-//! The map file: versions, features, observations in SQLite. All SQL of the project is here.
+//! The versioned map: [`History`] is what the program asks of it, [`MapFile`] keeps it in one SQLite file. All SQL of the
+//! project is here.
 
+mod backend;
 mod commit;
 mod commit_error;
 mod conflict;
+mod differences;
 mod error;
 mod feature_rows;
 mod forgotten;
 mod fsck;
 mod gc;
-mod history;
+
 mod index;
+mod interface;
+mod logs;
 mod looked_at;
 mod map_file;
 mod observations;
@@ -21,6 +26,7 @@ mod revert;
 mod revisions;
 mod rows;
 mod snapshot;
+mod states;
 #[cfg(test)]
 mod tests;
 
@@ -28,7 +34,8 @@ pub use commit_error::{CommitError, ConflictingChange};
 pub use error::StoreError;
 pub use fsck::Problem;
 pub use gc::Forgetting;
-pub use history::Provenance;
+pub use interface::History;
+pub use logs::Provenance;
 pub use map_file::{MapFile, MapInfo, NewMap};
 pub use observations::RecordedObservation;
 pub use proposals::{Proposal, ProposalDecision, ProposalStatus};

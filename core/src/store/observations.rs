@@ -3,7 +3,7 @@
 use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
 use super::rows::{digest, timestamp};
-use super::snapshot::check_version;
+use super::states::check_version;
 use crate::version::{Digest, Observation, VersionId};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, Row, ToSql, named_params};

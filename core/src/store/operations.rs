@@ -2,7 +2,7 @@
 
 use super::error::Fault;
 use super::rows::{FEATURE_COLUMNS, classes_at};
-use super::snapshot::features;
+use super::states::features;
 use crate::version::{Delta, Digest, FeatureState, Fid, Frame, Operations, VersionId};
 use resurvey_schema::ClassTable;
 use rusqlite::{Connection, named_params};

@@ -1,49 +1,26 @@
 //! The map at one version, for reading.
 
-use super::error::{Fault, StoreError};
-use super::forgotten::check_state;
-use super::index::IndexOrigin;
-use super::map_file::MapFile;
-use super::rows::{FEATURE_COLUMNS, classes_at, feature, head};
+use super::error::StoreError;
+use super::interface::History;
 use crate::version::{BoxMm, Digest, Feature, Fid, VersionId};
+use jiff::Timestamp;
 use resurvey_schema::ClassTable;
-use rusqlite::{Connection, OptionalExtension, ToSql, named_params};
+use std::fmt;
 
 /// The map as it was at one version, whatever is committed meanwhile. It cannot write.
-#[derive(Debug)]
-pub struct Snapshot<'m> {
-    pub(super) map: &'m MapFile,
-    pub(super) version: VersionId,
+#[derive(Clone)]
+pub struct Snapshot<'h> {
+    history: &'h dyn History,
+    version: VersionId,
     classes: ClassTable,
 }
 
-impl MapFile {
-    /// The newest version.
-    pub fn head(&self) -> Result<VersionId, StoreError> {
-        self.read(head).map(|record| record.version)
-    }
-
+impl<'h> Snapshot<'h> {
     /// The map at `version`.
-    pub fn snapshot(&self, version: VersionId) -> Result<Snapshot<'_>, StoreError> {
-        let classes = self.read(|connection| {
-            check_state(connection, version)?;
-            classes_at(connection, version)
-        })?;
-        Ok(Snapshot { map: self, version, classes })
+    pub fn of(history: &'h dyn History, version: VersionId) -> Result<Self, StoreError> {
+        Ok(Self { history, version, classes: history.classes(version)? })
     }
 
-    /// The bytes of the geometry that `digest` names.
-    pub fn geometry(&self, digest: Digest) -> Result<Vec<u8>, StoreError> {
-        const SQL: &str = "SELECT bytes FROM geometry WHERE digest = :digest ORDER BY digest";
-        self.read(|connection| {
-            let mut statement = connection.prepare_cached(SQL)?;
-            let bytes = statement.query_row(named_params! {":digest": digest.0}, |row| row.get(0)).optional()?;
-            bytes.ok_or(StoreError::NoSuchGeometry { digest }.into())
-        })
-    }
-}
-
-impl Snapshot<'_> {
     /// The version.
     pub fn version(&self) -> VersionId {
         self.version
@@ -54,92 +31,34 @@ impl Snapshot<'_> {
         &self.classes
     }
 
-    /// Every feature, by rising number.
-    pub fn features(&self) -> Result<Vec<Feature>, StoreError> {
-        self.map.read(|connection| {
-            let sql = format!(
-                "SELECT {FEATURE_COLUMNS} FROM feature_version AS f
-                WHERE f.from_version <= :version AND (f.to_version IS NULL OR f.to_version > :version) ORDER BY f.fid"
-            );
-            features(connection, &sql, named_params! {":version": self.version.0 as i64})
-        })
+    /// Every feature, by rising number; with a region those whose box shares a point with it.
+    pub fn features(&self, region: Option<&BoxMm>) -> Result<Vec<Feature>, StoreError> {
+        self.history.features(self.version, region)
     }
 
-    /// The features whose box shares a point with `region`, by rising number.
-    pub fn features_in(&self, region: &BoxMm) -> Result<Vec<Feature>, StoreError> {
-        self.map.read(|connection| {
-            let Some(origin) = IndexOrigin::read(connection)? else { return Ok(Vec::new()) };
-            let Some([e0, e1, n0, n1, h0, h1]) = origin.clamp(region) else { return Ok(Vec::new()) };
-            // The cross join keeps the index on the outside whatever the planner's statistics say.
-            let sql = format!(
-                "SELECT {FEATURE_COLUMNS} FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-                WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
-                    AND i.v0 <= :version AND i.v1 >= :version ORDER BY f.fid"
-            );
-            let parameters = named_params! {
-                ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1, ":version": self.version.0 as i64,
-            };
-            features(connection, &sql, parameters)
-        })
+    /// What this version knows to have been there at `time`; with a region what shares a point with it.
+    pub fn features_observed(&self, time: Timestamp, region: Option<&BoxMm>) -> Result<Vec<Feature>, StoreError> {
+        self.history.features_observed(self.version, time, region)
     }
 
     /// The feature `fid`.
     pub fn feature(&self, fid: Fid) -> Result<Feature, StoreError> {
-        let found = self.map.read(|connection| feature_at(connection, fid, self.version))?;
-        found.ok_or(StoreError::NoSuchFeature { fid, version: self.version })
+        self.history.feature(self.version, fid)
     }
 
     /// The bytes of the geometry that `digest` names.
     pub fn geometry(&self, digest: Digest) -> Result<Vec<u8>, StoreError> {
-        self.map.geometry(digest)
+        self.history.geometry(digest)
     }
 
-    /// The smallest box around all features; `None` for an empty map. Reads the whole index.
+    /// The smallest box around all features; `None` for an empty map.
     pub fn bounds(&self) -> Result<Option<BoxMm>, StoreError> {
-        const SQL: &str = "SELECT min(e0), max(e1), min(n0), max(n1), min(h0), max(h1) FROM feature_index
-            WHERE v0 <= :version AND v1 >= :version ORDER BY 1";
-        self.map.read(|connection| {
-            let Some(origin) = IndexOrigin::read(connection)? else { return Ok(None) };
-            let mut statement = connection.prepare_cached(SQL)?;
-            let mut rows = statement.query(named_params! {":version": self.version.0 as i64})?;
-            let Some(row) = rows.next()? else { return Ok(None) };
-            let mut ends = [0; 6];
-            for (column, end) in ends.iter_mut().enumerate() {
-                let Some(value) = row.get::<_, Option<i64>>(column)? else { return Ok(None) };
-                *end = value;
-            }
-            Ok(origin.box_at(&ends))
-        })
+        self.history.bounds(self.version)
     }
 }
 
-/// Refuses a version above the newest.
-pub(super) fn check_version(connection: &Connection, version: VersionId) -> Result<(), Fault> {
-    let head = head(connection)?.version;
-    if version > head { Err(StoreError::NoSuchVersion { version, head }.into()) } else { Ok(()) }
-}
-
-/// The feature `fid` at `version`, if it was there.
-pub(super) fn feature_at(connection: &Connection, fid: Fid, version: VersionId) -> Result<Option<Feature>, Fault> {
-    let sql = format!(
-        "SELECT {FEATURE_COLUMNS} FROM feature_version AS f WHERE f.fid = :fid AND f.from_version <= :version
-            AND (f.to_version IS NULL OR f.to_version > :version) ORDER BY f.from_version DESC LIMIT 1"
-    );
-    let parameters = named_params! {":fid": fid.0 as i64, ":version": version.0 as i64};
-    Ok(features(connection, &sql, parameters)?.pop())
-}
-
-/// The features that `sql` selects as [`FEATURE_COLUMNS`].
-pub(super) fn features(
-    connection: &Connection,
-    sql: &str,
-    parameters: &[(&str, &dyn ToSql)],
-) -> Result<Vec<Feature>, Fault> {
-    let mut statement = connection.prepare_cached(sql)?;
-    let mut rows = statement.query(parameters)?;
-    let mut features = Vec::new();
-    while let Some(row) = rows.next()? {
-        features.push(feature(row)?);
+impl fmt::Debug for Snapshot<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Snapshot").field("version", &self.version).finish_non_exhaustive()
     }
-    Ok(features)
 }

@@ -21,7 +21,7 @@ pub fn world_around(snapshot: &Snapshot<'_>, place: GridPoint) -> Result<World, 
         GridPoint::new(e + REACH_M, n + REACH_M, h + REACH_UP_M),
     )?;
     let (mut objects, mut descriptors) = (Vec::new(), Vec::new());
-    for feature in snapshot.features_in(&region)? {
+    for feature in snapshot.features(Some(&region))? {
         let fid = feature.fid.0;
         match feature.state {
             FeatureState::Descriptor(descriptor) => descriptors.push((fid, descriptor)),

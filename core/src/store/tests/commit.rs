@@ -187,8 +187,8 @@ fn a_snapshot_stays_as_it_is_while_others_commit() {
     let [early, reader] = [scratch.map.snapshot(VersionId(0)).unwrap(), other.snapshot(VersionId(1)).unwrap()];
     let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
     modify(&scratch, 1, 1, banner(0.5)).unwrap();
-    assert!(early.features_in(&everywhere).unwrap().is_empty());
-    let states: Vec<_> = reader.features_in(&everywhere).unwrap().into_iter().map(|feature| feature.state).collect();
+    assert!(early.features(Some(&everywhere)).unwrap().is_empty());
+    let states: Vec<_> = reader.features(Some(&everywhere)).unwrap().into_iter().map(|feature| feature.state).collect();
     assert_eq!(states, [banner(0.0), chair(100.0)]);
     assert_eq!(other.snapshot(VersionId(2)).unwrap().feature(Fid(1)).unwrap().state, banner(0.5));
 }
@@ -208,7 +208,7 @@ fn of_eight_writers_at_once_none_is_lost() {
     };
     std::thread::scope(|scope| (0..8).for_each(|writer| drop(scope.spawn(move || write(writer)))));
     assert_eq!(scratch.map.head(), Ok(VersionId(40)));
-    let features = scratch.map.snapshot(VersionId(40)).unwrap().features().unwrap();
+    let features = scratch.map.snapshot(VersionId(40)).unwrap().features(None).unwrap();
     let mut offsets: Vec<_> = features.into_iter().map(|feature| feature.state.bounds().unwrap().min()[1]).collect();
     offsets.sort_unstable();
     offsets.dedup();

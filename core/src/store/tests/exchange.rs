@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// What leads from one version to another, as text.
 fn changes(scratch: &Scratch, from: u64, to: u64) -> String {
     let (from, to) = (VersionId(from), VersionId(to));
-    let deltas = scratch.map.changes(from, to).unwrap();
+    let deltas = scratch.map.changes(from, to, None).unwrap();
     let digests = deltas.iter().filter_map(|delta| delta.after()?.geometry());
     let geometries: BTreeMap<Digest, Vec<u8>> =
         digests.map(|digest| (digest, scratch.map.geometry(digest).unwrap())).collect();

@@ -51,7 +51,7 @@ fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
     assert_eq!(chair_then, chair(100.0));
     let snapshot = map.snapshot(VersionId(5)).unwrap();
     assert_eq!(snapshot.feature(Fid(1)).unwrap().state, banner(0.5));
-    assert_eq!(snapshot.features_observed(at(6)).unwrap().len(), 4);
+    assert_eq!(snapshot.features_observed(at(6), None).unwrap().len(), 4);
     let mut stale = transaction(4);
     stale.additions = vec![chair(31.0)];
     let CommitError::Conflict { looked_at, .. } = map.commit(&stale, at(9)).unwrap_err() else { panic!() };
@@ -64,7 +64,7 @@ fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() 
     let before = std::fs::read(&path).unwrap();
     let reader = MapFile::open_read_only(&path).unwrap();
     assert_eq!((reader.info().unwrap().format, reader.fsck()), (1, Ok(Vec::new())));
-    assert_eq!(reader.snapshot(VersionId(2)).unwrap().features().unwrap().len(), 4);
+    assert_eq!(reader.snapshot(VersionId(2)).unwrap().features(None).unwrap().len(), 4);
     assert_eq!(reader.gc_plan(Some(VersionId(4))).unwrap().versions, [VersionId(2), VersionId(3)]);
     drop(reader);
     assert_eq!(std::fs::read(&path).unwrap(), before);
@@ -81,7 +81,7 @@ fn the_map_of_format_1_opens_and_takes_another_version() {
     assert_eq!(map.fsck(), Ok(Vec::new()));
     let snapshot = map.snapshot(VersionId(4)).unwrap();
     let states: Vec<_> =
-        snapshot.features().unwrap().into_iter().map(|feature| (feature.fid.0, feature.state)).collect();
+        snapshot.features(None).unwrap().into_iter().map(|feature| (feature.fid.0, feature.state)).collect();
     assert_eq!(states[0], (1, banner(0.5)));
     let FeatureState::Object { name, geometry, .. } = &states[1].1 else { panic!() };
     assert_eq!((name.as_str(), snapshot.geometry(*geometry)), ("tower", Ok(b"a mesh".to_vec())));

@@ -35,7 +35,7 @@ proptest! {
         let head = contents.len() - 1;
         let tagged = VersionId((tag % contents.len()) as u64);
         scratch.map.tag("kept", tagged, at(90)).unwrap();
-        let hashes: Vec<VersionRecord> = scratch.map.log().unwrap();
+        let hashes: Vec<VersionRecord> = scratch.map.log(None).unwrap();
         let mut limits = [limits.0 % contents.len(), limits.1 % contents.len()];
         limits.sort_unstable();
         for limit in limits {
@@ -44,7 +44,7 @@ proptest! {
             prop_assert_eq!(scratch.map.gc(Some(before), at(91)), Ok(plan));
             prop_assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
         }
-        prop_assert_eq!(scratch.map.log().unwrap(), hashes);
+        prop_assert_eq!(scratch.map.log(None).unwrap(), hashes);
         let is_kept = |version: usize| version == 0 || version >= limits[1] || version as u64 == tagged.0;
         let mut kept: Vec<usize> = Vec::new();
         for (version, expected) in contents.iter().enumerate() {
@@ -58,7 +58,7 @@ proptest! {
             }
         }
         for pair in kept.windows(2) {
-            let deltas = scratch.map.changes(VersionId(pair[0] as u64), VersionId(pair[1] as u64)).unwrap();
+            let deltas = scratch.map.changes(VersionId(pair[0] as u64), VersionId(pair[1] as u64), None).unwrap();
             let mut here: Content = contents[pair[0]].clone();
             for delta in deltas {
                 prop_assert_eq!(here.get(&delta.fid()), delta.before());
@@ -93,7 +93,7 @@ fn only_what_was_asked_for_is_forgotten_and_said_before() {
     let states = |version| scratch.map.snapshot(VersionId(version)).unwrap().feature(Fid(1)).unwrap().state;
     assert_eq!((states(2), states(5)), (chair(1.0), chair(4.0)));
     assert_eq!(
-        scratch.map.changes(VersionId(2), VersionId(5)).unwrap(),
+        scratch.map.changes(VersionId(2), VersionId(5), None).unwrap(),
         [Delta::modify(Fid(1), chair(1.0), chair(4.0))]
     );
     let gone = StoreError::Forgotten { version: VersionId(4), next: VersionId(5) };
@@ -130,7 +130,8 @@ fn geometry_and_images_go_with_the_last_version_that_needs_them() {
     // Version 3 was made from a photo whose labels are kept; the banner that it moved lives on.
     let mut removal = transaction(4);
     let snapshot = scratch.map.snapshot(VersionId(4)).unwrap();
-    removal.deltas = snapshot.features().unwrap().into_iter().map(|one| Delta::remove(one.fid, one.state)).collect();
+    removal.deltas =
+        snapshot.features(None).unwrap().into_iter().map(|one| Delta::remove(one.fid, one.state)).collect();
     scratch.map.commit(&removal, at(6)).unwrap();
     scratch.map.untag("surveyed").unwrap();
     let unseen = scratch.map.gc_plan(Some(VersionId(4))).unwrap();

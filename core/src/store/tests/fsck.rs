@@ -225,9 +225,9 @@ fn a_bit_flipped_anywhere_in_the_file_never_panics() {
         flipped[position] ^= 0x10;
         std::fs::write(&copy, &flipped).unwrap();
         let sound = MapFile::open_read_only(&copy).and_then(|map| {
-            map.snapshot(VersionId(2))?.features_in(&everywhere)?;
-            map.log_in(&everywhere)?;
-            map.changes(VersionId(0), VersionId(4))?;
+            map.snapshot(VersionId(2))?.features(Some(&everywhere))?;
+            map.log(Some(&everywhere))?;
+            map.changes(VersionId(0), VersionId(4), None)?;
             map.fsck()
         });
         found += usize::from(sound != Ok(Vec::new()));

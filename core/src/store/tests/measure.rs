@@ -71,7 +71,7 @@ fn the_store_at_200_000_descriptors() {
 
     for side_m in [80.0, 100.0, 500.0] {
         let snapshot = scratch.map.snapshot(VersionId(1)).unwrap();
-        let (time, rows) = median(|| snapshot.features_in(&square(side_m)).unwrap().len());
+        let (time, rows) = median(|| snapshot.features(Some(&square(side_m))).unwrap().len());
         println!("region of {side_m} m: {time:?} for {rows} rows");
     }
     let mut base = 1;
@@ -96,7 +96,7 @@ fn hot_spot(scratch: &Scratch, mut base: u64, random: &mut Random) {
     let first = base;
     let before = bytes(scratch);
     let region = square(100.0);
-    let mut live = scratch.map.snapshot(VersionId(base)).unwrap().features_in(&region).unwrap();
+    let mut live = scratch.map.snapshot(VersionId(base)).unwrap().features(Some(&region)).unwrap();
     let start = Instant::now();
     for _ in 0..HOT_VERSIONS {
         let mut update = transaction(base);
@@ -120,14 +120,14 @@ fn hot_spot(scratch: &Scratch, mut base: u64, random: &mut Random) {
     );
     for version in [first, (first + base) / 2, base] {
         let snapshot = scratch.map.snapshot(VersionId(version)).unwrap();
-        let (time, rows) = median(|| snapshot.features_in(&region).unwrap().len());
+        let (time, rows) = median(|| snapshot.features(Some(&region)).unwrap().len());
         println!("the same 100 m at version {version}: {time:?} for {rows} rows");
     }
     for (a, b) in [(first, base), (base - 10, base)] {
-        let difference = || scratch.map.changes_in(VersionId(a), VersionId(b), &square(50.0)).unwrap().len();
+        let difference = || scratch.map.changes(VersionId(a), VersionId(b), Some(&square(50.0))).unwrap().len();
         let (time, rows) = median(difference);
         println!("difference of 50 m over {} versions: {time:?} for {rows} deltas", b - a);
     }
-    let (time, rows) = median(|| scratch.map.log_in(&square(20.0)).unwrap().len());
+    let (time, rows) = median(|| scratch.map.log(Some(&square(20.0))).unwrap().len());
     println!("log of 20 m: {time:?} for {rows} versions");
 }

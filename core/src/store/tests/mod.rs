@@ -13,7 +13,7 @@ mod repair;
 mod review;
 mod undo;
 
-use super::{CommitError, MapFile, NewMap};
+use super::{CommitError, History, MapFile, NewMap};
 use crate::version::{FeatureState, Fid, Frame, UpdateTransaction, VersionId, VersionKind};
 use jiff::Timestamp;
 use resurvey_schema::{ClassId, ClassTable, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Uncertainty};

@@ -11,7 +11,7 @@ fn states(features: Vec<Feature>) -> Vec<(u64, FeatureState)> {
 }
 
 fn seen(scratch: &Scratch, version: u64, minute: i64) -> Vec<(u64, FeatureState)> {
-    states(scratch.map.snapshot(VersionId(version)).unwrap().features_observed(at(minute)).unwrap())
+    states(scratch.map.snapshot(VersionId(version)).unwrap().features_observed(at(minute), None).unwrap())
 }
 
 /// Commits a change of the chair, feature 1, that was seen at `minute`.
@@ -80,7 +80,7 @@ fn a_time_that_only_forgotten_versions_knew_is_refused() {
     scratch.map.gc(Some(VersionId(3)), at(300)).unwrap();
     let snapshot = scratch.map.snapshot(VersionId(3)).unwrap();
     let gone = StoreError::ForgottenTime { time: at(25), next: VersionId(3) };
-    assert_eq!(snapshot.features_observed(at(25)), Err(gone));
+    assert_eq!(snapshot.features_observed(at(25), None), Err(gone));
     assert_eq!(seen(&scratch, 3, 30), [(1, chair(2.0))]);
     assert_eq!(seen(&scratch, 3, 5), []);
 }
@@ -95,7 +95,7 @@ proptest! {
         let head = contents.len() as u64 - 1;
         for (version, expected) in contents.iter().enumerate() {
             // Version v was committed at minute v, without a time of its own.
-            let found = scratch.map.snapshot(VersionId(head)).unwrap().features_observed(at(version as i64)).unwrap();
+            let found = scratch.map.snapshot(VersionId(head)).unwrap().features_observed(at(version as i64), None).unwrap();
             let found: history::Content = found.into_iter().map(|one| (one.fid, one.state)).collect();
             prop_assert_eq!(&found, expected);
             prop_assert_eq!(&found, &content(&scratch, version));
@@ -115,8 +115,8 @@ proptest! {
         let n0 = 817_816.210_8 + low;
         let region = BoxMm::of_plan(835_500.0, n0, 835_600.0, n0 + 10.0).unwrap();
         let snapshot = scratch.map.snapshot(VersionId(moves.len() as u64)).unwrap();
-        let mut whole = snapshot.features_observed(at(minute)).unwrap();
+        let mut whole = snapshot.features_observed(at(minute), None).unwrap();
         whole.retain(|feature| feature.state.bounds().unwrap().intersects(&region));
-        prop_assert_eq!(snapshot.features_observed_in(at(minute), &region).unwrap(), whole);
+        prop_assert_eq!(snapshot.features_observed(at(minute), Some(&region)).unwrap(), whole);
     }
 }

@@ -88,7 +88,7 @@ fn a_map_in_a_directory_that_cannot_be_written_can_be_read() {
     fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o555)).unwrap();
     let reader = MapFile::open_read_only(&path).unwrap();
     let region = BoxMm::of_plan(835_567.0, 817_800.0, 835_568.0, 817_830.0).unwrap();
-    let found = reader.snapshot(VersionId(1)).unwrap().features_in(&region).unwrap();
+    let found = reader.snapshot(VersionId(1)).unwrap().features(Some(&region)).unwrap();
     assert_eq!(found.len(), 1);
     fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let beside: Vec<_> = fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();

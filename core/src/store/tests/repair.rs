@@ -17,9 +17,9 @@ fn repaired(sql: &str) -> (Vec<String>, Vec<String>) {
 #[test]
 fn a_sound_map_is_left_alone() {
     let scratch = eventful();
-    let before = scratch.map.log().unwrap();
+    let before = scratch.map.log(None).unwrap();
     assert_eq!(scratch.map.repair(), Ok(Vec::new()));
-    assert_eq!((scratch.map.log().unwrap(), scratch.map.fsck()), (before, Ok(Vec::new())));
+    assert_eq!((scratch.map.log(None).unwrap(), scratch.map.fsck()), (before, Ok(Vec::new())));
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn what_is_not_derivable_is_named_and_left() {
 fn questions_are_answered_again_after_the_index_was_lost() {
     let scratch = eventful();
     let everywhere = crate::version::BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
-    let ask = |version| scratch.map.snapshot(VersionId(version)).unwrap().features_in(&everywhere).unwrap();
+    let ask = |version| scratch.map.snapshot(VersionId(version)).unwrap().features(Some(&everywhere)).unwrap();
     let before = [1, 2, 3, 4].map(ask);
     damage(&scratch, "DELETE FROM feature_index");
     assert!(ask(4).is_empty());
