@@ -1,21 +1,17 @@
 //! Committing: optimistic, in one immediate transaction, all or nothing.
 
 use super::commit_error::CommitError;
-use super::conflict::{LiveRow, check_conflicts, live_rows};
-use super::error::{Fault, StoreError};
+use super::conflict::{check_conflicts, live_rows};
+use super::error::Fault;
 use super::feature_rows::{insert_geometries, last_fid, write_rows};
 use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
-use super::rows::{VersionRow, check_classes, classes_at, head, insert_classes};
-use crate::version::{
-    BoxMm, Counts, Delta, Digest, FeatureState, Fid, InvalidState, Operations, UpdateTransaction, VersionId,
-    VersionKind, VersionRecord, version_hash,
-};
+use super::plan::{check_new_classes, check_request, check_states, plan};
+use super::rows::{VersionRow, classes_at, head, insert_classes};
+use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
-use resurvey_schema::ClassTable;
 use rusqlite::{Connection, OptionalExtension, named_params};
-use std::collections::{BTreeMap, BTreeSet};
 
 type Refused = WriteFault<CommitError>;
 
@@ -65,18 +61,6 @@ pub(super) fn make_unseen_version(
     }
 }
 
-/// What the transaction does to the rows, worked out and checked.
-pub(super) struct Plan {
-    /// By rising feature number.
-    pub(super) deltas: Vec<Delta>,
-    /// The rows they end.
-    pub(super) live: BTreeMap<Fid, LiveRow>,
-    /// Box of the state after each delta.
-    pub(super) boxes: Vec<Option<BoxMm>>,
-    /// Box around all states, before and after.
-    pub(super) envelope: Option<BoxMm>,
-}
-
 /// Writes the next version, all but the row of its evidence.
 pub(super) fn make_version(
     connection: &Connection,
@@ -85,38 +69,26 @@ pub(super) fn make_version(
     now: Timestamp,
 ) -> Result<VersionRecord, Refused> {
     let head = head(connection)?;
-    check_request(transaction, &head)?;
-    let classes = check_new_classes(connection, transaction, head.version)?;
-    check_states(transaction, &classes)?;
+    check(connection, transaction, head.version)?;
     let live = live_rows(connection, &transaction.deltas)?;
     check_conflicts(connection, transaction, &live, head.version)?;
-    let plan = plan(connection, transaction, live)?;
-
-    let mut operations = Operations::start(None, transaction.classes.as_ref(), plan.deltas.len() as u64);
-    plan.deltas.iter().for_each(|delta| operations.add(delta));
-    let record = VersionRecord {
-        version: VersionId(head.version.0 + 1),
-        kind: transaction.kind,
-        committed_at: now.max(head.committed_at),
-        observed_at: transaction.observed_at,
-        author: transaction.author.clone(),
-        message: transaction.message.clone(),
-        base: Some(transaction.base),
-        reverts: transaction.reverts,
-        counts: Counts::of(&plan.deltas),
-        envelope: plan.envelope,
-        idempotency_key: transaction.idempotency_key.clone(),
-        evidence,
-        hash: version_hash(Some(head.hash), operations.finish(), evidence),
-    };
-    VersionRow::insert(connection, &record)?;
+    let state = |fid: Fid| live.get(&fid).map(|row| row.state.clone());
+    let plan = plan(transaction, state, last_fid(connection)?, &head, (evidence, now))?;
+    VersionRow::insert(connection, &plan.record)?;
     if let Some(classes) = &transaction.classes {
-        insert_classes(connection, record.version, classes)?;
+        insert_classes(connection, plan.record.version, classes)?;
     }
-    insert_looked_at(connection, record.version, transaction.viewed_region.as_ref())?;
+    insert_looked_at(connection, plan.record.version, transaction.viewed_region.as_ref())?;
     insert_geometries(connection, transaction)?;
-    write_rows(connection, &plan, record.version)?;
-    Ok(record)
+    write_rows(connection, &plan, &live)?;
+    Ok(plan.record)
+}
+
+/// Refuses what does not fit the map at its newest version, whatever else changed since the base.
+pub(super) fn check(connection: &Connection, transaction: &UpdateTransaction, head: VersionId) -> Result<(), Refused> {
+    check_request(transaction, head)?;
+    let classes = check_new_classes(transaction, classes_at(connection, head)?)?;
+    Ok(check_states(transaction, &classes)?)
 }
 
 /// The version that the same idempotency key made before.
@@ -130,96 +102,4 @@ pub(super) fn version_with(connection: &Connection, key: &str) -> Result<Option<
     let mut statement = connection.prepare_cached(SQL)?;
     let made = statement.query_row(named_params! {":key": key}, |row| row.get::<_, i64>(0)).optional()?;
     Ok(made.map(|version| VersionId(version.unsigned_abs())))
-}
-
-pub(super) fn check_request(transaction: &UpdateTransaction, head: &VersionRecord) -> Result<(), Refused> {
-    for version in [Some(transaction.base), transaction.reverts].into_iter().flatten() {
-        if version > head.version {
-            return refuse(StoreError::NoSuchVersion { version, head: head.version }.into());
-        }
-    }
-    if transaction.kind == VersionKind::Init {
-        return refuse(CommitError::Kind);
-    }
-    if transaction.is_empty() {
-        return refuse(CommitError::Empty);
-    }
-    let mut seen = BTreeSet::new();
-    for delta in &transaction.deltas {
-        let fid = delta.fid();
-        if !(1..=Fid::MAX.0).contains(&fid.0) {
-            return refuse(CommitError::FidRange { fid });
-        }
-        if !seen.insert(fid) {
-            return refuse(CommitError::Twice { fid });
-        }
-        if delta.before() == delta.after() {
-            return refuse(CommitError::NoChange { fid });
-        }
-    }
-    Ok(())
-}
-
-/// The class table that the states of the transaction must fit.
-fn check_new_classes(
-    connection: &Connection,
-    transaction: &UpdateTransaction,
-    head: VersionId,
-) -> Result<ClassTable, Refused> {
-    let old = classes_at(connection, head)?;
-    let Some(new) = &transaction.classes else { return Ok(old) };
-    check_classes(new).map_err(|error| WriteFault::Refused(error.into()))?;
-    match old.iter().find(|class| new.get(class.index).is_none_or(|kept| kept.kind != class.kind)) {
-        Some(lost) => refuse(CommitError::ClassLost { class: lost.name.clone() }),
-        None => Ok(new.clone()),
-    }
-}
-
-pub(super) fn check_states(transaction: &UpdateTransaction, classes: &ClassTable) -> Result<(), Refused> {
-    let invalid = |feature: String| move |error| WriteFault::Refused(CommitError::State { feature, error });
-    for (position, state) in transaction.additions.iter().enumerate() {
-        state.validate(classes).map_err(invalid(format!("addition {position}")))?;
-    }
-    for delta in &transaction.deltas {
-        let after = delta.after().map_or(Ok(()), |state| state.validate(classes));
-        after.map_err(invalid(format!("feature {}", delta.fid())))?;
-    }
-    Ok(())
-}
-
-/// Numbers the additions and orders all deltas by feature number, each with its exact state before.
-fn plan(
-    connection: &Connection,
-    transaction: &UpdateTransaction,
-    live: BTreeMap<Fid, LiveRow>,
-) -> Result<Plan, Refused> {
-    let mut last = transaction.deltas.iter().map(|delta| delta.fid().0).fold(last_fid(connection)?.0, u64::max);
-    let mut deltas = Vec::with_capacity(transaction.deltas.len() + transaction.additions.len());
-    for delta in &transaction.deltas {
-        let before = live.get(&delta.fid()).map(|row| row.state.clone());
-        deltas.extend(Delta::from_sides(delta.fid(), before, delta.after().cloned()));
-    }
-    for state in &transaction.additions {
-        last += 1;
-        if last > Fid::MAX.0 {
-            return refuse(CommitError::FidRange { fid: Fid(last) });
-        }
-        deltas.push(Delta::add(Fid(last), state.clone()));
-    }
-    deltas.sort_by_key(Delta::fid);
-    let mut envelope: Option<BoxMm> = None;
-    let mut boxes = Vec::with_capacity(deltas.len());
-    for delta in &deltas {
-        let bounds = |state: Option<&FeatureState>| state.map(FeatureState::bounds).transpose();
-        let invalid = |error| {
-            let error = InvalidState::Box(error);
-            WriteFault::Refused(CommitError::State { feature: format!("feature {}", delta.fid()), error })
-        };
-        let (before, after) = (bounds(delta.before()).map_err(invalid)?, bounds(delta.after()).map_err(invalid)?);
-        for bounds in [before, after].into_iter().flatten() {
-            envelope = Some(envelope.map_or(bounds, |envelope| envelope.union(&bounds)));
-        }
-        boxes.push(after);
-    }
-    Ok(Plan { deltas, live, boxes, envelope })
 }

@@ -5,6 +5,7 @@ use super::error::Fault;
 use super::forgotten::check_state;
 use super::index::IndexOrigin;
 use super::map_file::WriteFault;
+use super::plan::starts_from;
 use super::states::feature_at;
 use crate::version::{BoxMm, Delta, FeatureState, Fid, UpdateTransaction, VersionId};
 use rusqlite::{Connection, named_params};
@@ -52,11 +53,7 @@ pub(super) fn check_conflicts(
     }
     for delta in &transaction.deltas {
         let found = live.get(&delta.fid()).map(|row| &row.state);
-        let as_expected = match (delta.before(), found) {
-            (Some(before), Some(found)) => before.is_same_as(found),
-            (before, found) => before.is_none() && found.is_none(),
-        };
-        if !as_expected {
+        if !starts_from(delta, found) {
             changed.insert(delta.fid(), true);
         }
     }

@@ -1,13 +1,14 @@
 //! Writing the rows of features, their index and their geometry.
 
-use super::commit::Plan;
 use super::commit_error::CommitError;
 use super::conflict::LiveRow;
 use super::error::Fault;
 use super::index::{IndexBox, IndexOrigin, LIVE, hilbert_key};
 use super::map_file::WriteFault;
-use crate::version::{Delta, Digest, FeatureState, Fid, UpdateTransaction, VersionId};
+use super::plan::{Plan, check_digests, needed_geometry};
+use crate::version::{Delta, FeatureState, Fid, UpdateTransaction, VersionId};
 use rusqlite::{CachedStatement, Connection, named_params, params};
+use std::collections::BTreeMap;
 
 /// Stores the geometry that new objects need and the map does not have.
 pub(super) fn insert_geometries(
@@ -17,27 +18,16 @@ pub(super) fn insert_geometries(
     const INSERT: &str =
         "INSERT INTO geometry (digest, bytes) VALUES (:digest, :bytes) ON CONFLICT (digest) DO NOTHING";
     const EXISTS: &str = "SELECT 1 FROM geometry WHERE digest = :digest ORDER BY digest";
-    let after = transaction.deltas.iter().filter_map(Delta::after);
-    for state in transaction.additions.iter().chain(after) {
-        let FeatureState::Object { name, geometry, .. } = state else { continue };
-        match transaction.geometries.get(geometry) {
+    for (name, digest) in needed_geometry(transaction) {
+        match transaction.geometries.get(&digest) {
             Some(bytes) => {
-                connection.prepare_cached(INSERT)?.execute(named_params! {":digest": geometry.0, ":bytes": bytes})?;
+                connection.prepare_cached(INSERT)?.execute(named_params! {":digest": digest.0, ":bytes": bytes})?;
             }
-            None if connection.prepare_cached(EXISTS)?.exists(named_params! {":digest": geometry.0})? => {}
-            None => {
-                let error = CommitError::NoGeometry { name: name.clone(), digest: *geometry };
-                return Err(WriteFault::Refused(error));
-            }
+            None if connection.prepare_cached(EXISTS)?.exists(named_params! {":digest": digest.0})? => {}
+            None => return Err(CommitError::NoGeometry { name: name.to_owned(), digest }.into()),
         }
     }
-    for (given, bytes) in &transaction.geometries {
-        let found = Digest::of(bytes);
-        if found != *given {
-            return Err(WriteFault::Refused(CommitError::WrongDigest { given: *given, found }));
-        }
-    }
-    Ok(())
+    Ok(check_digests(transaction)?)
 }
 
 /// The highest number that a feature has or had.
@@ -53,10 +43,11 @@ pub(super) fn last_fid(connection: &Connection) -> Result<Fid, Fault> {
 pub(super) fn write_rows(
     connection: &Connection,
     plan: &Plan,
-    version: VersionId,
+    live: &BTreeMap<Fid, LiveRow>,
 ) -> Result<(), WriteFault<CommitError>> {
-    end_rows(connection, plan, version)?;
-    let Some(envelope) = &plan.envelope else { return Ok(()) };
+    let version = plan.record.version;
+    end_rows(connection, live, version)?;
+    let Some(envelope) = &plan.record.envelope else { return Ok(()) };
     let origin = match IndexOrigin::read(connection)? {
         Some(origin) => origin,
         None => {
@@ -84,10 +75,10 @@ pub(super) fn write_rows(
     Ok(())
 }
 
-fn end_rows(connection: &Connection, plan: &Plan, version: VersionId) -> Result<(), Fault> {
+fn end_rows(connection: &Connection, live: &BTreeMap<Fid, LiveRow>, version: VersionId) -> Result<(), Fault> {
     const END: &str = "UPDATE feature_version SET to_version = :version WHERE id = :id AND to_version IS NULL";
     const END_INDEX: &str = "UPDATE feature_index SET v1 = :last WHERE id = :id";
-    for (fid, LiveRow { id, .. }) in &plan.live {
+    for (fid, LiveRow { id, .. }) in live {
         let ended = connection.prepare_cached(END)?.execute(named_params! {":version": version.0 as i64, ":id": id})?;
         let last = version.0 as i64 - 1;
         let indexed = connection.prepare_cached(END_INDEX)?.execute(named_params! {":last": last, ":id": id})?;

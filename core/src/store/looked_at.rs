@@ -2,8 +2,9 @@
 
 use super::error::Fault;
 use super::forgotten::has_table;
+use super::plan::touched;
 use super::rows::{box_columns, read_box};
-use crate::version::{BoxMm, Delta, FeatureState, UpdateTransaction, VersionId};
+use crate::version::{BoxMm, UpdateTransaction, VersionId};
 use rusqlite::{Connection, named_params};
 
 /// Writes down what the writer of `version` looked at.
@@ -31,10 +32,7 @@ pub(super) fn looked_at_since(
     if !has_table(connection)? {
         return Ok(Vec::new());
     }
-    let sides = transaction.deltas.iter().flat_map(|delta: &Delta| delta.before().into_iter().chain(delta.after()));
-    // A state without a box is refused later, by name.
-    let boxes = sides.chain(&transaction.additions).filter_map(|state: &FeatureState| state.bounds().ok());
-    let touched: Vec<BoxMm> = boxes.collect();
+    let touched = touched(transaction);
     let mut statement = connection.prepare_cached(SQL)?;
     let mut rows = statement.query(named_params! {":base": transaction.base.0 as i64})?;
     let mut versions = Vec::new();

@@ -1,8 +1,9 @@
 //! Making and opening a map file.
 
+use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::rows::{VersionRow, check_classes, insert_classes};
-use crate::version::{Counts, Digest, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
+use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
@@ -245,6 +246,12 @@ impl<E, F: Into<Fault>> From<F> for WriteFault<E> {
     }
 }
 
+impl From<CommitError> for WriteFault<CommitError> {
+    fn from(error: CommitError) -> Self {
+        Self::Refused(error)
+    }
+}
+
 /// The number of migrations that the file has had.
 pub(super) fn format_of(connection: &Connection) -> Result<usize, Fault> {
     let format: i32 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
@@ -272,14 +279,15 @@ fn fill(connection: &Connection, new: &NewMap, now: Timestamp) -> Result<(), Wri
             ":created_at": now.as_microsecond(),
         },
     )?;
-    let operations = Operations::start(Some(&new.frame), Some(&new.classes), 0).finish();
-    let record = first_version(new, now, version_hash(None, operations, None));
+    let record = first_version(new, now);
     VersionRow::insert(connection, &record)?;
     insert_classes(connection, record.version, &new.classes)?;
     Ok(())
 }
 
-fn first_version(new: &NewMap, now: Timestamp, hash: Digest) -> VersionRecord {
+/// The record of the empty map.
+pub(super) fn first_version(new: &NewMap, now: Timestamp) -> VersionRecord {
+    let operations = Operations::start(Some(&new.frame), Some(&new.classes), 0).finish();
     VersionRecord {
         version: VersionId(0),
         kind: VersionKind::Init,
@@ -293,7 +301,7 @@ fn first_version(new: &NewMap, now: Timestamp, hash: Digest) -> VersionRecord {
         envelope: None,
         idempotency_key: None,
         evidence: None,
-        hash,
+        hash: version_hash(None, operations, None),
     }
 }
 

@@ -113,6 +113,11 @@ fn read(row: &Row) -> Result<RecordedObservation, Fault> {
     })
 }
 
+/// The digest under which `observation` is kept.
+pub(super) fn evidence_digest(observation: &Observation) -> Result<Digest, StoreError> {
+    Evidence::of(observation).map(|evidence| evidence.digest)
+}
+
 /// An observation in the form that is kept and digested.
 pub(super) struct Evidence<'o> {
     observation: &'o Observation,

@@ -1,10 +1,11 @@
 //! Updates that wait for review: deltas against a base version that are not in the history yet.
 
-use super::commit::{check_request, check_states, make_unseen_version, make_version};
+use super::commit::{make_unseen_version, make_version};
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::{Evidence, digest_of, link};
+use super::plan::{check_request, check_states};
 use super::rows::{box_columns, classes_at, head, read_box, timestamp};
 use crate::version::{
     BoxMm, Delta, FeatureState, Observation, UpdateTransaction, VersionId, VersionKind, proposal_bytes,
@@ -90,8 +91,8 @@ impl MapFile {
                     ids.push(made);
                     continue;
                 }
-                check_request(transaction, &head)?;
-                check_is_descriptors(transaction).map_err(WriteFault::Refused)?;
+                check_request(transaction, head.version)?;
+                check_is_descriptors(transaction)?;
                 check_states(transaction, &classes)?;
                 if let (Some(evidence), None) = (&evidence, observation) {
                     observation = Some(evidence.insert(connection, transaction.base, None, now)?);

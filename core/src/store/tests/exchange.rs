@@ -1,6 +1,5 @@
 //! Change sets between copies of a map: out as text, in on another copy, and back.
 
-use super::history::{content, play, steps};
 use super::*;
 use crate::version::{Digest, read_change_set, write_change_set};
 use proptest::prelude::*;
@@ -41,17 +40,17 @@ proptest! {
 
     #[test]
     fn a_copy_is_led_from_any_version_to_any_other_and_back(
-        history in steps(), from in any::<usize>(), to in any::<usize>(),
+        history in moves(), from in any::<usize>(), to in any::<usize>(),
     ) {
         let (scratch, copy) = (Scratch::new(), Scratch::new());
-        let contents = play(&scratch, &history);
+        let contents = play(&scratch.map, &history);
         let (from, to) = (from % contents.len(), to % contents.len());
         let start = apply(&copy, &changes(&scratch, 0, from as u64));
-        prop_assert_eq!(&content(&copy, start), &contents[from]);
+        prop_assert_eq!(&content(&copy.map, start), &contents[from]);
         let there = apply(&copy, &changes(&scratch, from as u64, to as u64));
-        prop_assert_eq!(&content(&copy, there), &contents[to]);
+        prop_assert_eq!(&content(&copy.map, there), &contents[to]);
         let back = apply(&copy, &changes(&scratch, to as u64, from as u64));
-        prop_assert_eq!(&content(&copy, back), &contents[from]);
+        prop_assert_eq!(&content(&copy.map, back), &contents[from]);
         prop_assert_eq!(copy.map.fsck(), Ok(Vec::new()));
     }
 }
@@ -70,13 +69,13 @@ fn objects_travel_with_their_geometry_and_every_kind_of_descriptor_to_the_last_b
     let copy = Scratch::new();
     // The class table was renamed in version 4: the copy takes over what was there before.
     let there = apply(&copy, &changes(&scratch, 0, 3));
-    assert_eq!(content(&copy, there), content(&scratch, 3));
+    assert_eq!(content(&copy.map, there), content(&scratch.map, 3));
     assert_eq!(copy.map.geometry(Digest::of(b"a mesh")), Ok(b"a mesh".to_vec()));
     let there = apply(&copy, &changes(&scratch, 4, 5));
-    let pairs = content(&copy, there).into_iter().zip(content(&scratch, 5));
+    let pairs = content(&copy.map, there).into_iter().zip(content(&scratch.map, 5));
     for ((fid, state), (other_fid, other)) in pairs {
         assert!(fid == other_fid && state.is_same_as(&other), "{state:?} {other:?}");
     }
     let back = apply(&copy, &changes(&scratch, 5, 4));
-    assert_eq!(content(&copy, back), content(&scratch, 3));
+    assert_eq!(content(&copy.map, back), content(&scratch.map, 3));
 }

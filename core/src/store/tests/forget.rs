@@ -1,8 +1,8 @@
 //! Forgetting versions: what is kept stays what it was, and what is gone says so.
 
 use super::fsck::eventful;
-use super::history::{Content, content, play, steps};
 use super::*;
+use crate::store::conformance::Content;
 use crate::store::{Forgetting, StoreError};
 use crate::version::{Delta, Digest, Observation, VersionRecord};
 use proptest::prelude::*;
@@ -29,9 +29,9 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_is_kept_is_what_it_was_then(history in steps(), limits in (any::<usize>(), any::<usize>()), tag in any::<usize>()) {
+    fn what_is_kept_is_what_it_was_then(history in moves(), limits in (any::<usize>(), any::<usize>()), tag in any::<usize>()) {
         let scratch = Scratch::new();
-        let contents = play(&scratch, &history);
+        let contents = play(&scratch.map, &history);
         let head = contents.len() - 1;
         let tagged = VersionId((tag % contents.len()) as u64);
         scratch.map.tag("kept", tagged, at(90)).unwrap();
@@ -49,7 +49,7 @@ proptest! {
         let mut kept: Vec<usize> = Vec::new();
         for (version, expected) in contents.iter().enumerate() {
             if is_kept(version) {
-                prop_assert_eq!(&content(&scratch, version), expected);
+                prop_assert_eq!(&content(&scratch.map, version), expected);
                 kept.push(version);
             } else {
                 let next = (version..=head).find(|version| is_kept(*version)).unwrap();

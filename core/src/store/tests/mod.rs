@@ -1,5 +1,6 @@
 //! Tests of the store through its public door, and the maps they start from.
 
+mod caught;
 mod commit;
 mod exchange;
 mod fixture;
@@ -13,9 +14,9 @@ mod repair;
 mod review;
 mod undo;
 
+use super::conformance::{Subject, at, banner, chair, content, moves, new_map, play, transaction};
 use super::{CommitError, History, MapFile, NewMap};
-use crate::version::{FeatureState, Fid, Frame, UpdateTransaction, VersionId, VersionKind};
-use jiff::Timestamp;
+use crate::version::{FeatureState, Fid, VersionId};
 use resurvey_schema::{ClassId, ClassTable, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Uncertainty};
 use tempfile::TempDir;
 
@@ -51,48 +52,26 @@ impl Scratch {
     }
 }
 
-fn new_map() -> NewMap {
-    NewMap {
-        map_id: "test".to_owned(),
-        frame: Frame { crs: "EPSG:2326".to_owned(), vertical_datum: "hkpd".to_owned() },
-        classes: ClassTable::default(),
-        author: "survey".to_owned(),
-        message: "an empty map".to_owned(),
+/// Damage is found by `fsck` here.
+impl Subject for Scratch {
+    fn history(&self) -> &dyn History {
+        &self.map
+    }
+
+    fn inspect(&self) -> Result<(), String> {
+        let problems = self.map.fsck().map_err(|error| error.to_string())?;
+        if problems.is_empty() { Ok(()) } else { Err(format!("{problems:?}")) }
     }
 }
 
-/// `minutes` after 2026-03-01T00:00:00Z.
-fn at(minutes: i64) -> Timestamp {
-    Timestamp::from_second(1_772_323_200 + 60 * minutes).unwrap()
+mod map_file {
+    crate::conformance_tests!(|new: &super::NewMap, now| {
+        let directory = super::TempDir::new().unwrap();
+        let map = super::MapFile::create(&directory.path().join("map.rsv"), new, now).unwrap();
+        Box::new(super::Scratch { directory, map })
+    });
 }
 
-fn transaction(base: u64) -> UpdateTransaction {
-    UpdateTransaction::new(VersionId(base), VersionKind::Update, "phone 7", "a test")
-}
-
-/// A banner of 9.6 × 6.9 m, `offset` m north of the one of the case street-banner-removed.
-fn banner(offset: f64) -> FeatureState {
-    let corner = |n: f64, h| GridPoint::new(835_567.743_1, n + offset, h);
-    FeatureState::Descriptor(Descriptor::Material(MaterialDescriptor {
-        class: ClassId(3),
-        corners: [
-            corner(817_816.210_8, 8.129_6),
-            corner(817_825.842, 8.129_6),
-            corner(817_825.842, 15.014_8),
-            corner(817_816.210_8, 15.014_8),
-        ],
-        normal: [1.0, 0.0, 0.0],
-        sigma: Some(Uncertainty { position_m: 0.1, size_m: Some(0.05), area_m2: None }),
-    }))
-}
-
-/// A chair, `offset` m north of the banner's bottom-left corner.
-fn chair(offset: f64) -> FeatureState {
-    FeatureState::Descriptor(Descriptor::Dynamic(DynamicDescriptor {
-        class: ClassId(5),
-        position: GridPoint::new(835_567.743_1, 817_816.210_8 + offset, 7.2),
-        size_m: [0.5, 0.5, 0.9],
-        yaw_rad: None,
-        sigma: None,
-    }))
+mod memory {
+    crate::conformance_tests!(|new: &super::NewMap, now| Box::new(crate::store::MemoryMap::new(new, now).unwrap()));
 }

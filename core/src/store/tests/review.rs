@@ -3,7 +3,7 @@
 use super::history::observation;
 use super::*;
 use crate::store::{ProposalStatus, StoreError};
-use crate::version::{BoxMm, Decision, Delta};
+use crate::version::{BoxMm, Decision, Delta, UpdateTransaction};
 
 /// 20 m around the chair at `offset` m.
 fn view(offset: f64) -> Option<BoxMm> {

@@ -1,10 +1,8 @@
 //! Undoing versions.
 
-use super::history::{content, play, steps};
 use super::*;
 use crate::store::{ConflictingChange, Revert, StoreError};
 use crate::version::{BoxMm, Counts, Delta, Digest, VersionKind};
-use proptest::prelude::*;
 
 fn wish(version: u64, region: Option<BoxMm>) -> Revert {
     Revert { version: VersionId(version), region, author: "ada".to_owned(), message: None, idempotency_key: None }
@@ -18,63 +16,6 @@ fn undo(scratch: &Scratch, version: u64) -> Result<VersionId, CommitError> {
 fn around(offset: f64) -> Option<BoxMm> {
     let n = 817_816.210_8 + offset;
     Some(BoxMm::of_plan(835_560.0, n - 1.0, 835_575.0, n + 1.0).unwrap())
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
-
-    #[test]
-    fn the_newest_version_undone_is_the_one_before_and_that_undone_is_the_original(history in steps()) {
-        let scratch = Scratch::new();
-        let contents = play(&scratch, &history);
-        let head = contents.len() - 1;
-        prop_assume!(head > 0);
-        prop_assert_eq!(undo(&scratch, head as u64), Ok(VersionId(head as u64 + 1)));
-        prop_assert_eq!(&content(&scratch, head + 1), &contents[head - 1]);
-        prop_assert_eq!(undo(&scratch, head as u64 + 1), Ok(VersionId(head as u64 + 2)));
-        prop_assert_eq!(&content(&scratch, head + 2), &contents[head]);
-        prop_assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
-    }
-
-    #[test]
-    fn all_versions_undone_from_the_newest_on_leave_the_empty_map(history in steps()) {
-        let scratch = Scratch::new();
-        let contents = play(&scratch, &history);
-        let head = contents.len() - 1;
-        for version in (1..=head).rev() {
-            undo(&scratch, version as u64).unwrap();
-            let now = scratch.map.head().unwrap();
-            prop_assert_eq!(&content(&scratch, now.0 as usize), &contents[version - 1]);
-        }
-    }
-
-    #[test]
-    fn an_undo_either_restores_every_feature_of_the_version_or_names_who_changed_them(
-        history in steps(), which in any::<usize>(),
-    ) {
-        let scratch = Scratch::new();
-        let contents = play(&scratch, &history);
-        let head = contents.len() - 1;
-        prop_assume!(head > 0);
-        let version = VersionId(1 + (which % head) as u64);
-        let did = scratch.map.changes_of(version).unwrap();
-        match undo(&scratch, version.0) {
-            Ok(made) => {
-                let now = content(&scratch, made.0 as usize);
-                for delta in &did {
-                    prop_assert_eq!(now.get(&delta.fid()), delta.before());
-                }
-            }
-            Err(CommitError::Conflict { changed, .. }) => {
-                for ConflictingChange { fid, changed_in, .. } in changed {
-                    prop_assert!(did.iter().any(|delta| delta.fid() == fid) && changed_in.unwrap() > version);
-                }
-                prop_assert_eq!(scratch.map.head(), Ok(VersionId(head as u64)));
-            }
-            other => prop_assert!(false, "{:?}", other),
-        }
-        prop_assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
-    }
 }
 
 #[test]
