@@ -59,10 +59,14 @@ impl Failure {
         Self::new(INPUT, anyhow::anyhow!("{text}"))
     }
 
-    /// The same, naming `file` where the message does not.
+    /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
-        if self.to_string().contains(&place) { self } else { Self { error: self.error.context(place), ..self } }
+        if self.code == MAP || self.to_string().contains(&place) {
+            self
+        } else {
+            Self { error: self.error.context(place), ..self }
+        }
     }
 
     /// What machines are told, once.
@@ -137,7 +141,8 @@ impl From<StoreError> for Failure {
             | StoreError::NoSuchGeometry { .. }
             | StoreError::ReadOnly { .. }
             | StoreError::NoWriteAheadLog { .. }
-            | StoreError::Full { .. } => MAP,
+            | StoreError::Full { .. }
+            | StoreError::Io { .. } => MAP,
             StoreError::Busy { .. } => CONFLICT,
             StoreError::Internal { .. } => INTERNAL,
             StoreError::NotFound { .. }

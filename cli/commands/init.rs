@@ -2,7 +2,7 @@
 
 use crate::args::Init;
 use crate::console::Console;
-use crate::failure::{Failure, USAGE};
+use crate::failure::{Failure, INPUT, USAGE};
 use jiff::Timestamp;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{MapFile, NewMap, StoreError};
@@ -28,10 +28,13 @@ pub fn run(options: &Init, console: &mut Console<'_>) -> Result<u8, Failure> {
         author: "resurvey".to_owned(),
         message: "init".to_owned(),
     };
-    let map = MapFile::create(&options.map, &new, Timestamp::now()).map_err(|error| match &options.classes {
-        Some(classes) if matches!(error, StoreError::ClassTable { .. }) => Failure::from(error).about(classes),
-        _ => error.into(),
-    })?;
+    let map =
+        MapFile::create(&options.map, &new, Timestamp::now()).map_err(|error| match (error, &options.classes) {
+            (error @ StoreError::ClassTable { .. }, Some(classes)) => Failure::from(error).about(classes),
+            // There is no map yet whose disk could fail, only a file that cannot be written.
+            (error @ StoreError::Io { .. }, _) => Failure::new(INPUT, error),
+            (error, _) => error.into(),
+        })?;
     if console.is_json() {
         let frame = map.info()?.frame;
         console.document(&json!({
