@@ -8,7 +8,7 @@ pub use history::{Changes, Diff, DiffFormat, Gc, ProposalAction, Proposals, Retr
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
-use resurvey_core::version::parse_moment;
+use resurvey_core::version::{PluginBuild, parse_moment};
 use std::path::PathBuf;
 
 /// Keeps a 3D city map current from phone photos.
@@ -73,6 +73,8 @@ pub enum Command {
     Export(Export),
     /// Compare matchers on captures with known truth; changes nothing on disk but the file you name with --csv
     Eval(Eval),
+    /// Run the plugins of a version again on what it saw, and compare
+    Replay(Replay),
     /// List and describe plugins; changes nothing
     #[command(subcommand)]
     Plugins(Plugins),
@@ -349,6 +351,9 @@ pub struct Log {
     pub fid: Option<u64>,
     #[command(flatten)]
     pub region: Region,
+    /// Only versions that this plugin took part in: the SHA-256 of its build (8 digits or more), NAME or NAME@VERSION
+    #[arg(long, value_name = "BUILD")]
+    pub by_plugin: Option<PluginBuild>,
     /// At most this many versions
     #[arg(long, short = 'n', value_name = "N")]
     pub limit: Option<usize>,
@@ -361,6 +366,22 @@ pub struct Why {
     pub map: PathBuf,
     /// Feature id, as query prints it
     pub fid: u64,
+}
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+pub struct Replay {
+    /// Map file
+    pub map: PathBuf,
+    /// Version, tag or date
+    #[arg(value_name = "REV")]
+    pub revision: String,
+    /// The capture, where the map did not keep its label image (update --keep-labels does)
+    #[arg(long, value_name = "CAPTURE.json")]
+    pub capture: Option<PathBuf>,
+    /// Also with other builds of the plugins than the recorded ones
+    #[arg(long)]
+    pub any_build: bool,
 }
 
 /// Arguments of `apply`.

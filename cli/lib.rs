@@ -15,7 +15,7 @@ use args::{Cli, Command};
 use clap::Parser;
 use commands::{
     apply, changes, diff, eval, evidence, export, fsck, gc, generate, import, init, localize, log, plugins, proposals,
-    query, render, revert, tag, update,
+    query, render, replay, revert, tag, update,
 };
 use console::Console;
 use failure::{Failure, USAGE};
@@ -92,6 +92,7 @@ fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {
         Command::Query(options) => query::run(options, console),
         Command::Log(options) => log::run(options, console),
         Command::Diff(options) => diff::run(options, console),
+        Command::Replay(options) => replay::run(options, &cli.plugins, console),
         Command::Revert(options) => revert::run(options, console),
         Command::Tag(options) => tag::run(options, console),
         Command::Why(options) => evidence::run(options, console),

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use anyhow::anyhow;
 use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
 use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginError, PluginInfo, Registry};
-use resurvey_core::version::PluginUse;
+use resurvey_core::version::{PluginUse, SearchRange};
 use std::path::{Path, PathBuf};
 
 /// Colon-separated directories of plugin libraries.
@@ -100,6 +100,11 @@ impl Choices {
             }
         }
         Ok(choices)
+    }
+
+    /// How the evidence records how far the search goes.
+    pub fn search_range(&self) -> SearchRange {
+        SearchRange { radius_m: self.search.radius_m, yaw_range_deg: self.search.yaw_range_deg }
     }
 
     /// Makes `plugin`, a matcher of this run, score every candidate at full size.

@@ -2,6 +2,7 @@
 
 use super::Region;
 use clap::{Args, ValueEnum};
+use resurvey_core::version::PluginBuild;
 use std::path::PathBuf;
 
 /// Arguments of `diff`.
@@ -36,8 +37,12 @@ pub struct Revert {
     /// Map file
     pub map: PathBuf,
     /// Version, tag or date of what is undone
-    #[arg(value_name = "REV")]
-    pub revision: String,
+    #[arg(value_name = "REV", conflicts_with = "by_plugin")]
+    pub revision: Option<String>,
+    /// Undo every version that a plugin took part in and that still shows, all or none: the SHA-256 of its build (8 digits
+    /// or more), NAME or NAME@VERSION
+    #[arg(long, value_name = "BUILD")]
+    pub by_plugin: Option<PluginBuild>,
     /// Only what lies in the region before or after
     #[command(flatten)]
     pub region: Region,

@@ -20,6 +20,10 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
         (Some(fid), None) => map.log_of(Fid(fid))?,
         (None, bounds) => map.log(bounds.as_ref())?,
     };
+    if let Some(build) = &options.by_plugin {
+        let versions = map.versions_by(build)?;
+        records.retain(|record| versions.contains(&record.version));
+    }
     records.truncate(options.limit.unwrap_or(usize::MAX));
     if console.is_json() {
         let versions: Vec<_> = records.iter().map(document::version).collect();

@@ -17,6 +17,7 @@ pub mod plugins;
 pub mod proposals;
 pub mod query;
 pub mod render;
+pub mod replay;
 pub mod revert;
 mod review;
 pub mod tag;

@@ -3,35 +3,70 @@
 use super::crs_of;
 use crate::args::Revert;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, NOTHING};
 use crate::region;
 use jiff::Timestamp;
 use resurvey_core::store::{self, History, MapFile};
-use serde_json::json;
+use resurvey_core::version::{PluginBuild, VersionId};
+use serde_json::{Value, json};
 
-/// Undoes one version by a new one.
+/// Undoes one version by a new one, or all that a plugin build did by one for each.
 pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
-    let wish = store::Revert {
-        version: map.resolve(&options.revision)?,
+    let mut wish = store::Revert {
+        version: VersionId(0),
         region: region::bbox(&options.region, crs_of(&map)?, false)?,
         author: options.author.clone(),
         message: options.message.clone(),
         idempotency_key: options.retry.idempotency_key.clone(),
     };
-    let version = map.revert(&wish, Timestamp::now())?;
-    let counts = map.version(version)?.counts;
-    let (added, modified, removed) = (counts.added, counts.modified, counts.removed);
-    if console.is_json() {
-        console.document(&json!({
-            "reverts": wish.version.0, "version": version.0,
-            "added": added, "modified": modified, "removed": removed,
-        }))?;
-    } else {
-        console.line(format_args!(
-            "version {version} undoes version {}: {added} added, {modified} modified, {removed} removed",
-            wish.version
-        ))?;
+    match (&options.by_plugin, &options.revision) {
+        (Some(build), _) => all_of(&map, build, &wish, console),
+        (None, Some(revision)) => {
+            wish.version = map.resolve(revision)?;
+            let version = map.revert(&wish, Timestamp::now())?;
+            let document = undone(&map, wish.version, version)?;
+            if console.is_json() {
+                console.document(&document)?;
+            } else {
+                console.line(words(&document))?;
+            }
+            Ok(0)
+        }
+        (None, None) => Err(Failure::usage("expected a version or --by-plugin BUILD")),
     }
-    Ok(0)
+}
+
+fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let versions = map.versions_by(build)?;
+    let done = map.revert_all(&versions, wish, Timestamp::now())?;
+    let documents =
+        done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;
+    if console.is_json() {
+        console
+            .document(&json!({ "plugin": build.to_string(), "versions_by_plugin": versions, "reverted": documents }))?;
+    } else {
+        for document in &documents {
+            console.line(words(document))?;
+        }
+        if documents.is_empty() {
+            console.line(format_args!("{} versions by {build}, nothing of them shows", versions.len()))?;
+        }
+    }
+    Ok(if documents.is_empty() { NOTHING } else { 0 })
+}
+
+fn undone(map: &MapFile, reverts: VersionId, version: VersionId) -> Result<Value, Failure> {
+    let counts = map.version(version)?.counts;
+    Ok(json!({
+        "reverts": reverts.0, "version": version.0,
+        "added": counts.added, "modified": counts.modified, "removed": counts.removed,
+    }))
+}
+
+fn words(document: &Value) -> String {
+    format!(
+        "version {} undoes version {}: {} added, {} modified, {} removed",
+        document["version"], document["reverts"], document["added"], document["modified"], document["removed"]
+    )
 }

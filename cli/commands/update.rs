@@ -19,7 +19,8 @@ use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::{History, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
-    BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, UpdateTransaction, VersionId, VersionKind,
+    BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction, VersionId,
+    VersionKind,
 };
 use resurvey_schema::{Localization, Pose};
 use serde_json::{Map, Value, json};
@@ -47,6 +48,7 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
                 (true, None) => Some(Review::Propose),
                 (false, None) => None,
             },
+            search: Some(tools.choices.search_range()),
         };
         let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new() };
         match run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console) {
@@ -145,6 +147,8 @@ pub(super) struct Recording<'a> {
     pub(super) author: &'a str,
     pub(super) idempotency_key: Option<&'a str>,
     pub(super) review: Option<Review>,
+    /// How far around the prior the pose is looked for.
+    pub(super) search: Option<SearchRange>,
 }
 
 /// A capture that was read, and the map around it.
@@ -256,7 +260,8 @@ impl Run<'_> {
         Ok(located)
     }
 
-    fn compare(
+    /// Finds and measures what differs from the map, seen from where the photo stood.
+    pub(super) fn compare(
         &mut self,
         world: &World,
         capture: &Capture,
@@ -339,10 +344,13 @@ impl Run<'_> {
             taken_at: capture.taken_at,
             labels: self.recording.keep_labels.then(|| capture.label_bytes.clone()),
             prior: Some(capture.prior),
+            camera: Some(capture.camera.intrinsics()),
+            search: self.recording.search.filter(|_| !is_given),
             localization: Some(LocalizationEvidence {
                 pose: localization.pose,
                 score: (!is_given).then_some(localization.score),
                 covariance: localization.covariance,
+                alignment: localization.alignment,
                 runner_up: localization.runner_up,
                 candidates: localization.candidates,
             }),

@@ -21,6 +21,7 @@ mod models;
 mod page;
 mod plugin_files;
 mod priors;
+mod provenance;
 mod reports;
 mod reviews;
 mod table_v;

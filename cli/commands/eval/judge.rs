@@ -26,6 +26,7 @@ const RECORDING: Recording<'_> = Recording {
     author: "eval",
     idempotency_key: None,
     review: None,
+    search: None,
 };
 
 /// Why a true change was missed where no rejection says more.

@@ -8,7 +8,7 @@ use crate::version::Digest;
 use jiff::Timestamp;
 use resurvey_schema::capture::FORMAT;
 use resurvey_schema::service::Prior;
-use resurvey_schema::{CaptureFile, ClassTable};
+use resurvey_schema::{CaptureFile, ClassTable, GridPoint, Pose};
 use std::path::Path;
 
 /// A labelled photo with its camera and prior, all checked.
@@ -35,6 +35,11 @@ impl Capture {
         RoughCapture::read(path, &PriorSource::Capture, classes, crs)?.settled_without_map()
     }
 
+    /// The labels and camera of `path`, with a prior that says nothing: somebody else knows it.
+    pub fn labelled(path: &Path, classes: &ClassTable) -> Result<Self, CaptureError> {
+        Self::with_labels(path, &read_file(path)?, UNKNOWN, None, classes)
+    }
+
     /// The capture of `file`, whose text is `text`, with its label image.
     pub(super) fn with_labels(
         path: &Path,
@@ -58,6 +63,14 @@ impl Capture {
         Ok(Self { labels, label_bytes, camera, prior, taken_at, digest })
     }
 }
+
+const UNKNOWN: Prior = Prior {
+    pose: Pose { position: GridPoint::new(0.0, 0.0, 0.0), yaw_rad: 0.0, pitch_rad: 0.0, roll_rad: 0.0 },
+    position_sigma_m: f64::INFINITY,
+    height_sigma_m: f64::INFINITY,
+    yaw_sigma_rad: f64::INFINITY,
+    tilt_sigma_rad: f64::INFINITY,
+};
 
 /// `capture.json` and its text.
 pub(super) fn read_file(path: &Path) -> Result<(CaptureFile, Vec<u8>), CaptureError> {

@@ -242,7 +242,9 @@ fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
             _ if detail.contains("no such") => StoreError::Damaged { path, detail },
             _ => StoreError::Internal { path, detail },
         },
-        rusqlite::Error::FromSqlConversionFailure(..)
+        // Every statement is prepared by a test on a whole map: what it names is missing from this one.
+        rusqlite::Error::SqlInputError { .. }
+        | rusqlite::Error::FromSqlConversionFailure(..)
         | rusqlite::Error::IntegralValueOutOfRange(..)
         | rusqlite::Error::InvalidColumnType(..)
         | rusqlite::Error::Utf8Error(..)

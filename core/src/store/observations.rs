@@ -4,7 +4,7 @@ use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
 use super::rows::{digest, timestamp};
 use super::states::check_version;
-use crate::version::{Digest, Observation, VersionId};
+use crate::version::{Digest, Observation, PluginBuild, VersionId};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, Row, ToSql, named_params};
 
@@ -66,6 +66,21 @@ impl MapFile {
     /// The observation behind `version`, if it has one.
     pub fn observation_of(&self, version: VersionId) -> Result<Option<RecordedObservation>, StoreError> {
         self.read(|connection| of_version(connection, version))
+    }
+
+    /// The versions, newest first, in whose observation `build` took part, or in one that confirmed it.
+    pub fn versions_by(&self, build: &PluginBuild) -> Result<Vec<VersionId>, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM observation WHERE version IS NOT NULL ORDER BY version DESC");
+        let mut versions = Vec::new();
+        for recorded in self.read(|connection| select(connection, &sql, &[]))? {
+            let mut took_part = build.took_part(&recorded.observation);
+            for digest in &recorded.observation.confirmations {
+                let other = self.observation_named(*digest)?;
+                took_part |= other.is_some_and(|other| build.took_part(&other.observation));
+            }
+            versions.extend(recorded.version.filter(|_| took_part));
+        }
+        Ok(versions)
     }
 
     /// The label image that `digest` names, as PNG; `None` when it was not kept.

@@ -1,10 +1,15 @@
 //! Undoing one version by a new one.
 
+use super::commit::make_unseen_version;
 use super::commit_error::CommitError;
 use super::error::StoreError;
 use super::interface::History;
+use super::map_file::MapFile;
 use crate::version::{BoxMm, Delta, UpdateTransaction, VersionId, VersionKind, VersionRecord};
+use jiff::Timestamp;
 use resurvey_schema::ClassTable;
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
 /// What is to be undone, by whom and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +24,58 @@ pub struct Revert {
     pub message: Option<String>,
     /// The same key a second time gives the version of the first time.
     pub idempotency_key: Option<String>,
+}
+
+impl MapFile {
+    /// Undoes each of `versions` that still shows, newest first, each by a version of its own: all of them or none. `wish`
+    /// says the rest; its idempotency key goes to the first. Gives what was undone and by which version.
+    pub fn revert_all(
+        &self,
+        versions: &[VersionId],
+        wish: &Revert,
+        now: Timestamp,
+    ) -> Result<Vec<(VersionId, VersionId)>, CommitError> {
+        let newest_first: BTreeSet<Reverse<VersionId>> = versions.iter().copied().map(Reverse).collect();
+        self.write(|connection| {
+            let mut key = wish.idempotency_key.clone();
+            if let Some(made) = key.as_deref().map_or(Ok(None), |key| self.made_with(key))? {
+                let undone = self.version(made)?.reverts.unwrap_or(made);
+                return Ok(vec![(undone, made)]);
+            }
+            let mut done = Vec::new();
+            for Reverse(version) in newest_first {
+                let one = Revert { version, idempotency_key: key.clone(), ..wish.clone() };
+                let Some(transaction) = self.undoing_what_shows(&one)? else { continue };
+                let made = make_unseen_version(connection, &transaction, None, now)?;
+                key = None;
+                done.push((version, made.version));
+            }
+            Ok(done)
+        })
+    }
+
+    /// The transaction that undoes what `wish` names, without what is undone already.
+    fn undoing_what_shows(&self, wish: &Revert) -> Result<Option<UpdateTransaction>, CommitError> {
+        let mut transaction = match undoing(self, wish) {
+            Ok(transaction) => transaction,
+            Err(CommitError::NothingToRevert { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let head = self.head()?;
+        let mut showing = Vec::new();
+        for delta in std::mem::take(&mut transaction.deltas) {
+            let live = match self.feature(head, delta.fid()) {
+                Ok(feature) => Some(feature.state),
+                Err(StoreError::NoSuchFeature { .. }) => None,
+                Err(error) => return Err(error.into()),
+            };
+            if live.as_ref() != delta.after() {
+                showing.push(delta);
+            }
+        }
+        transaction.deltas = showing;
+        Ok((!transaction.is_empty()).then_some(transaction))
+    }
 }
 
 /// The transaction that undoes what `wish` names.

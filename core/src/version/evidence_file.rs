@@ -1,10 +1,10 @@
 //! The JSON form of an observation as the map file keeps it. Its digest is that of these bytes, so they are written
 //! once and never again from what was read.
 
-use super::{Decision, Digest, Gate, LocalizationEvidence, Observation, PluginUse};
+use super::{Decision, Digest, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange};
 use jiff::Timestamp;
 use resurvey_schema::service::Prior;
-use resurvey_schema::{ClassId, GridPoint, Pose, Rejection, RunnerUp};
+use resurvey_schema::{Alignment, CameraModel, ClassId, GridPoint, Intrinsics, Pose, Rejection, RunnerUp};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 const FORMAT: &str = "resurvey.observation/1";
@@ -32,6 +32,10 @@ struct ObservationFile {
     taken_at: Option<String>,
     labels: Option<Digest>,
     prior: Option<PriorFile>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    camera: Option<IntrinsicsFile>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    search: Option<[Number; 2]>,
     localization: Option<LocalizationFile>,
     plugins: Vec<PluginFile>,
     gates: Vec<GateFile>,
@@ -59,10 +63,24 @@ struct PriorFile {
 }
 
 #[derive(Serialize, Deserialize)]
+struct IntrinsicsFile {
+    model: String,
+    width: u32,
+    height: u32,
+    fx: Number,
+    fy: Number,
+    cx: Number,
+    cy: Number,
+    distortion: [Number; 5],
+}
+
+#[derive(Serialize, Deserialize)]
 struct LocalizationFile {
     pose: PoseRadians,
     score: Option<Number>,
     covariance: [[Number; 3]; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    alignment: Option<Alignment>,
     runner_up: Option<[Number; 2]>,
     candidates: u64,
 }
@@ -105,6 +123,8 @@ impl Observation {
             taken_at: self.taken_at.map(|time| time.to_string()),
             labels: self.labels.as_deref().map(Digest::of),
             prior: self.prior.as_ref().map(prior_to_file),
+            camera: self.camera.as_ref().map(camera_to_file),
+            search: self.search.map(|range| [Number(range.radius_m), Number(range.yaw_range_deg)]),
             localization: self.localization.as_ref().map(localization_to_file),
             plugins: self.plugins.iter().map(plugin_to_file).collect(),
             gates: self.gates.iter().map(gate_to_file).collect(),
@@ -128,6 +148,8 @@ impl Observation {
             taken_at: taken_at.map_err(|error| format!("taken_at: {error}"))?,
             labels: None,
             prior: file.prior.as_ref().map(prior_from_file),
+            camera: file.camera.as_ref().map(camera_from_file).transpose()?,
+            search: file.search.map(|[radius, yaw]| SearchRange { radius_m: radius.0, yaw_range_deg: yaw.0 }),
             localization: file.localization.as_ref().map(localization_from_file),
             plugins: file.plugins.into_iter().map(plugin_from_file).collect(),
             gates: file.gates.into_iter().map(gate_from_file).collect(),
@@ -176,11 +198,43 @@ fn prior_from_file(file: &PriorFile) -> Prior {
     }
 }
 
+const MODELS: [(CameraModel, &str); 3] =
+    [(CameraModel::Pinhole, "pinhole"), (CameraModel::Brown, "brown"), (CameraModel::Fisheye, "fisheye")];
+
+fn camera_to_file(camera: &Intrinsics) -> IntrinsicsFile {
+    let name = MODELS.iter().find(|(model, _)| *model == camera.model).map_or("pinhole", |(_, name)| name);
+    IntrinsicsFile {
+        model: name.to_owned(),
+        width: camera.width,
+        height: camera.height,
+        fx: Number(camera.fx),
+        fy: Number(camera.fy),
+        cx: Number(camera.cx),
+        cy: Number(camera.cy),
+        distortion: camera.distortion.map(Number),
+    }
+}
+
+fn camera_from_file(file: &IntrinsicsFile) -> Result<Intrinsics, String> {
+    let model = MODELS.iter().find(|(_, name)| *name == file.model).map(|(model, _)| *model);
+    Ok(Intrinsics {
+        model: model.ok_or_else(|| format!("unknown camera model {:?}", file.model))?,
+        width: file.width,
+        height: file.height,
+        fx: file.fx.0,
+        fy: file.fy.0,
+        cx: file.cx.0,
+        cy: file.cy.0,
+        distortion: file.distortion.map(|number| number.0),
+    })
+}
+
 fn localization_to_file(localization: &LocalizationEvidence) -> LocalizationFile {
     LocalizationFile {
         pose: pose_to_file(&localization.pose),
         score: localization.score.map(Number),
         covariance: localization.covariance.map(|row| row.map(Number)),
+        alignment: localization.alignment,
         runner_up: localization.runner_up.map(|other| [Number(other.distance_m), Number(other.score_ratio)]),
         candidates: localization.candidates,
     }
@@ -191,6 +245,7 @@ fn localization_from_file(file: &LocalizationFile) -> LocalizationEvidence {
         pose: pose_from_file(&file.pose),
         score: file.score.map(|number| number.0),
         covariance: file.covariance.map(|row| row.map(|number| number.0)),
+        alignment: file.alignment,
         runner_up: file.runner_up.map(|[distance, ratio]| RunnerUp { distance_m: distance.0, score_ratio: ratio.0 }),
         candidates: file.candidates,
     }

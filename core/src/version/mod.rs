@@ -2,6 +2,7 @@
 
 mod base64;
 mod box_mm;
+mod build;
 mod canonical;
 mod change_set;
 mod delta;
@@ -16,13 +17,14 @@ mod revision;
 mod transaction;
 
 pub use box_mm::{BoxMm, InvalidBox};
+pub use build::PluginBuild;
 pub use canonical::CanonicalError;
 pub use change_set::{ChangeSet, ChangeSetError, read_change_set, write_change_set};
 pub use delta::{Counts, Delta};
 pub use descriptor_file::{InvalidDescriptor, descriptor_from_file, descriptor_to_file};
 pub use digest::{Digest, InvalidDigest};
 pub use feature_state::{FeatureState, InvalidState};
-pub use observation::{Decision, Gate, LocalizationEvidence, Observation, PluginUse};
+pub use observation::{Decision, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange};
 pub use operations::{Frame, Operations, version_hash};
 pub(crate) use operations::{proposal_bytes, read_proposal_bytes};
 pub use record::{Feature, VersionRecord};

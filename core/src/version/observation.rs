@@ -3,7 +3,7 @@
 use super::Digest;
 use jiff::Timestamp;
 use resurvey_schema::service::Prior;
-use resurvey_schema::{Pose, Rejection, RunnerUp};
+use resurvey_schema::{Alignment, Intrinsics, Pose, Rejection, RunnerUp};
 
 /// One attempt to update the map from one capture.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +16,10 @@ pub struct Observation {
     pub labels: Option<Vec<u8>>,
     /// The phone's rough pose.
     pub prior: Option<Prior>,
+    /// The camera of the label image; maps before 2026-12 do not say.
+    pub camera: Option<Intrinsics>,
+    /// How far around the prior the pose was looked for; maps before 2026-12 do not say.
+    pub search: Option<SearchRange>,
     /// The pose that was found.
     pub localization: Option<LocalizationEvidence>,
     /// What computed it.
@@ -39,10 +43,21 @@ pub struct LocalizationEvidence {
     pub score: Option<f64>,
     /// Covariance over easting (m), northing (m) and yaw (rad); row-major.
     pub covariance: [[f64; 3]; 3],
+    /// What the matcher, or whoever gave the pose, knew beyond that.
+    pub alignment: Option<Alignment>,
     /// The strongest other mode.
     pub runner_up: Option<RunnerUp>,
     /// Candidate poses that were scored.
     pub candidates: u64,
+}
+
+/// How far around the prior candidates lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchRange {
+    /// Distance in plan, metres.
+    pub radius_m: f64,
+    /// Angle of the heading to either side, degrees.
+    pub yaw_range_deg: f64,
 }
 
 /// A plugin as it was used.

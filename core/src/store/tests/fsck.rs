@@ -36,6 +36,8 @@ fn seen(capture: &[u8], labels: Option<&[u8]>) -> Observation {
         taken_at: Some(at(2)),
         labels: labels.map(<[u8]>::to_vec),
         prior: None,
+        camera: None,
+        search: None,
         localization: None,
         plugins: Vec::new(),
         gates: Vec::new(),

@@ -2,9 +2,11 @@
 
 use super::*;
 use crate::store::{ProposalStatus, StoreError};
-use crate::version::{BoxMm, Counts, Decision, Delta, Digest, Gate, LocalizationEvidence, Observation, PluginUse};
+use crate::version::{
+    BoxMm, Counts, Decision, Delta, Digest, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange,
+};
 use resurvey_schema::service::Prior;
-use resurvey_schema::{Pose, Rejection, RunnerUp};
+use resurvey_schema::{Alignment, CameraModel, Intrinsics, Pose, Rejection, RunnerUp};
 
 #[test]
 fn a_feature_that_leaves_the_region_is_a_modification_with_both_sides() {
@@ -70,10 +72,22 @@ pub(super) fn observation(decision: Decision) -> Observation {
             yaw_sigma_rad: 0.3,
             tilt_sigma_rad: 0.02,
         }),
+        camera: Some(Intrinsics {
+            model: CameraModel::Brown,
+            width: 960,
+            height: 720,
+            fx: 700.1,
+            fy: 700.3,
+            cx: 480.0,
+            cy: 360.0,
+            distortion: [0.1, -0.01, 0.0, 1e-5, 0.0],
+        }),
+        search: Some(SearchRange { radius_m: 40.0, yaw_range_deg: 25.0 }),
         localization: Some(LocalizationEvidence {
             pose,
             score: Some(0.93),
             covariance: [[0.04, 0.0, 0.0], [0.0, 0.09, 0.0], [0.0, 0.0, 1e-5]],
+            alignment: Some(Alignment { covariance: [[0.1; 6]; 6], map_sigma_m: 0.25, label_sigma_px: 2.3 }),
             runner_up: Some(RunnerUp { distance_m: 12.0, score_ratio: 0.4 }),
             candidates: 407_025,
         }),
