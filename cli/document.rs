@@ -90,6 +90,8 @@ pub fn plugin_use(used: &PluginUse) -> Value {
         "version": used.version,
         "sha256": used.sha256.map(|digest| digest.to_string()),
         "settings": used.settings,
+        "settings_sha256": used.settings_sha256.map(|digest| digest.to_string()),
+        "files": used.files,
     })
 }
 

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use anyhow::anyhow;
 use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
 use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginError, PluginInfo, Registry};
-use resurvey_core::version::{PluginUse, SearchRange};
+use resurvey_core::version::{ModelFile, PluginUse, SearchRange};
 use std::path::{Path, PathBuf};
 
 /// Colon-separated directories of plugin libraries.
@@ -185,6 +185,12 @@ impl Tool {
     /// How the evidence records it.
     pub fn used(&self) -> Result<PluginUse, Failure> {
         let info: &PluginInfo = self.plugin.info();
+        let mut files = Vec::new();
+        for (setting, path) in self.settings.files(self.plugin.schema()) {
+            let bytes = std::fs::read(&path)
+                .map_err(|error| Failure::input(format!("{}.{setting}: {}: {error}", info.name, path.display())))?;
+            files.push(ModelFile { setting, sha256: Digest::of(&bytes) });
+        }
         Ok(PluginUse {
             kind: info.kind.to_string(),
             name: info.name.clone(),
@@ -193,6 +199,8 @@ impl Tool {
             settings: serde_json::from_str(self.settings.as_json()).map_err(|error| {
                 Failure::new(crate::failure::INTERNAL, anyhow!("settings of {}: {error}", info.name))
             })?,
+            settings_sha256: Some(self.settings.sha256()),
+            files,
         })
     }
 }

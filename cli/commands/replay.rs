@@ -91,7 +91,16 @@ impl Tools {
             }));
             let given = values(used);
             let settings = plugin.settings(given.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
-            Ok(Some(Tool { plugin, settings }))
+            let tool = Tool { plugin, settings };
+            if tool.used()?.files != used.files && !any_build {
+                let text = format!(
+                    "{kind} {}: the files that its settings name are not those of the record; find them, or \
+                    compare with these: --any-build",
+                    used.name
+                );
+                return Err(Failure::new(PLUGIN, anyhow!(text)));
+            }
+            Ok(Some(tool))
         };
         let matcher = load("matcher")?;
         let (detector, estimator) = (load("detector")?, load("estimator")?);

@@ -80,6 +80,8 @@ mod tests {
             version: "0.1.0".to_owned(),
             sha256: Some(Digest([0xAB; 32])),
             settings: serde_json::Value::Null,
+            settings_sha256: None,
+            files: Vec::new(),
         };
         let is = |text: &str| text.parse::<PluginBuild>().unwrap().is(&used);
         assert!(is("abababab") && is("ABABABABAB") && is(&"ab".repeat(32)) && is("semantic") && is("semantic@0.1.0"));

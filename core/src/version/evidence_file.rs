@@ -1,7 +1,7 @@
 //! The JSON form of an observation as the map file keeps it. Its digest is that of these bytes, so they are written
 //! once and never again from what was read.
 
-use super::{Decision, Digest, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange};
+use super::{Decision, Digest, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange};
 use jiff::Timestamp;
 use resurvey_schema::service::Prior;
 use resurvey_schema::{Alignment, CameraModel, ClassId, GridPoint, Intrinsics, Pose, Rejection, RunnerUp};
@@ -92,6 +92,10 @@ struct PluginFile {
     version: String,
     sha256: Option<Digest>,
     settings: serde_json::Value,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    settings_sha256: Option<Digest>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    files: Vec<ModelFile>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -252,13 +256,13 @@ fn localization_from_file(file: &LocalizationFile) -> LocalizationEvidence {
 }
 
 fn plugin_to_file(plugin: &PluginUse) -> PluginFile {
-    let PluginUse { kind, name, version, sha256, settings } = plugin.clone();
-    PluginFile { kind, name, version, sha256, settings }
+    let PluginUse { kind, name, version, sha256, settings, settings_sha256, files } = plugin.clone();
+    PluginFile { kind, name, version, sha256, settings, settings_sha256, files }
 }
 
 fn plugin_from_file(file: PluginFile) -> PluginUse {
-    let PluginFile { kind, name, version, sha256, settings } = file;
-    PluginUse { kind, name, version, sha256, settings }
+    let PluginFile { kind, name, version, sha256, settings, settings_sha256, files } = file;
+    PluginUse { kind, name, version, sha256, settings, settings_sha256, files }
 }
 
 fn gate_to_file(gate: &Gate) -> GateFile {

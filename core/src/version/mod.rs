@@ -24,7 +24,7 @@ pub use delta::{Counts, Delta};
 pub use descriptor_file::{InvalidDescriptor, descriptor_from_file, descriptor_to_file};
 pub use digest::{Digest, InvalidDigest};
 pub use feature_state::{FeatureState, InvalidState};
-pub use observation::{Decision, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange};
+pub use observation::{Decision, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange};
 pub use operations::{Frame, Operations, version_hash};
 pub(crate) use operations::{proposal_bytes, read_proposal_bytes};
 pub use record::{Feature, VersionRecord};

@@ -4,6 +4,7 @@ use super::Digest;
 use jiff::Timestamp;
 use resurvey_schema::service::Prior;
 use resurvey_schema::{Alignment, Intrinsics, Pose, Rejection, RunnerUp};
+use serde::{Deserialize, Serialize};
 
 /// One attempt to update the map from one capture.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +74,19 @@ pub struct PluginUse {
     pub sha256: Option<Digest>,
     /// Its settings, every default spelt out.
     pub settings: serde_json::Value,
+    /// Digest of the settings as they were handed over; maps before 2026-12 do not say.
+    pub settings_sha256: Option<Digest>,
+    /// Files that its settings name, such as the weights of a network.
+    pub files: Vec<ModelFile>,
+}
+
+/// A file that a plugin read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModelFile {
+    /// The setting that names it.
+    pub setting: String,
+    /// Digest of its bytes.
+    pub sha256: Digest,
 }
 
 /// One limit of the reliability gate and what was measured against it.

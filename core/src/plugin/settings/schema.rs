@@ -23,6 +23,9 @@ pub struct Setting {
     pub minimum: Option<f64>,
     /// Highest number allowed.
     pub maximum: Option<f64>,
+    /// Whether its text is the path of a file that the plugin reads, such as the weights of a network: then the evidence
+    /// names the file's digest. Empty for none.
+    pub is_file: bool,
     /// What it does, with its unit.
     pub description: String,
 }
@@ -117,7 +120,7 @@ impl Setting {
     fn parse(schema: &Value) -> Result<Self, String> {
         let Value::Object(schema) = schema else { return Err(format!("expected an object, found {schema}")) };
         for keyword in schema.keys() {
-            let known = ["type", "default", "enum", "minimum", "maximum", "description", "title", "examples"];
+            let known = ["type", "default", "enum", "minimum", "maximum", "description", "title", "examples", "format"];
             if !known.contains(&keyword.as_str()) {
                 return Err(format!("{keyword} is not understood; known are: {}", known.join(", ")));
             }
@@ -129,6 +132,11 @@ impl Setting {
             }
         };
         let value_type = schema.get("type").and_then(ValueType::parse);
+        let is_file = match schema.get("format") {
+            None => false,
+            Some(Value::String(format)) if format == "file" && value_type == Some(ValueType::String) => true,
+            Some(format) => return Err(format!("format: expected \"file\" on a string, found {format}")),
+        };
         let setting = Self {
             value_type: value_type.ok_or("type: expected number, integer, boolean or string")?,
             default: schema.get("default").cloned().ok_or("default is missing")?,
@@ -139,6 +147,7 @@ impl Setting {
             },
             minimum: bound("minimum")?,
             maximum: bound("maximum")?,
+            is_file,
             description: schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned(),
         };
         setting.checked(&setting.default).map_err(|expected| format!("default: expected {expected}"))?;

@@ -4,6 +4,7 @@ use super::super::info::Digest;
 use super::schema::{SettingsError, SettingsSchema, ValueType};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// `plugin.key=value`, as `--set` takes it.
@@ -41,6 +42,15 @@ impl Settings {
     /// A JSON object with every setting, sorted by name, each number in one form.
     pub fn as_json(&self) -> &str {
         &self.json
+    }
+
+    /// Settings of `schema` that name a file, and the file.
+    pub fn files(&self, schema: &SettingsSchema) -> Vec<(String, PathBuf)> {
+        let values: BTreeMap<String, Value> = serde_json::from_str(&self.json).unwrap_or_default();
+        let path =
+            |key: &str| values.get(key).and_then(Value::as_str).filter(|path| !path.is_empty()).map(PathBuf::from);
+        let files = schema.iter().filter(|(_, setting)| setting.is_file);
+        files.filter_map(|(key, _)| Some((key.to_owned(), path(key)?))).collect()
     }
 
     /// Digest of [`as_json`](Self::as_json), for the evidence.
@@ -149,13 +159,26 @@ mod tests {
             (
                 r#"{"properties": {"a": {"type": "number", "default": 5, "minimun": 4}}}"#,
                 "settings schema: a: minimun is not understood; known are: type, default, enum, minimum, maximum, \
-                 description, title, examples",
+                 description, title, examples, format",
             ),
         ] {
             assert_eq!(SettingsSchema::parse(schema).unwrap_err().to_string(), message);
         }
         assert!(SettingsSchema::parse("{").is_err());
         assert_eq!(SettingsSchema::parse("").unwrap().complete([]).unwrap().as_json(), "{}");
+    }
+
+    #[test]
+    fn a_setting_may_name_a_file_that_the_plugin_reads() {
+        let schema = r#"{"properties": {"weights": {"type": "string", "default": "", "format": "file"},
+                                        "mode": {"type": "string", "default": "fast"}}}"#;
+        let schema = SettingsSchema::parse(schema).unwrap();
+        assert_eq!(schema.complete([]).unwrap().files(&schema), []);
+        let given = schema.complete([("weights", "models/city.onnx")]).unwrap();
+        assert_eq!(given.files(&schema), [("weights".to_owned(), PathBuf::from("models/city.onnx"))]);
+        let wrong = r#"{"properties": {"a": {"type": "number", "default": 1, "format": "file"}}}"#;
+        let message = "settings schema: a: format: expected \"file\" on a string, found \"file\"";
+        assert_eq!(SettingsSchema::parse(wrong).unwrap_err().to_string(), message);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use crate::store::{ProposalStatus, StoreError};
 use crate::version::{
-    BoxMm, Counts, Decision, Delta, Digest, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange,
+    BoxMm, Counts, Decision, Delta, Digest, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange,
 };
 use resurvey_schema::service::Prior;
 use resurvey_schema::{Alignment, CameraModel, Intrinsics, Pose, Rejection, RunnerUp};
@@ -97,6 +97,8 @@ pub(super) fn observation(decision: Decision) -> Observation {
             version: "0.1.0".to_owned(),
             sha256: Some(Digest::of(b"library")),
             settings: serde_json::json!({"radius_m": 40, "b": 1, "a": 0.1}),
+            settings_sha256: Some(Digest::of(b"settings")),
+            files: vec![ModelFile { setting: "weights".to_owned(), sha256: Digest::of(b"weights") }],
         }],
         gates: vec![Gate { name: "position-sigma".into(), measured: 0.3, limit: 1.0, unit: "m".into(), passed: true }],
         rejections: vec![Rejection {
