@@ -2,9 +2,11 @@
 
 mod eval;
 mod history;
+mod plugins;
 
 pub use eval::{Eval, Experiment, TableV};
 pub use history::{Changes, Diff, DiffFormat, Gc, ProposalAction, Proposals, Retry, Revert, Tag};
+pub use plugins::{Check, Install, Limits, Plugins};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
@@ -75,7 +77,7 @@ pub enum Command {
     Eval(Eval),
     /// Run the plugins of a version again on what it saw, and compare
     Replay(Replay),
-    /// List and describe plugins; changes nothing
+    /// List, check, install and remove plugins; no map is touched
     #[command(subcommand)]
     Plugins(Plugins),
     /// Check everything that must hold in a map; changes nothing without --repair
@@ -410,22 +412,6 @@ pub struct Export {
     pub diff: Option<String>,
     #[command(flatten)]
     pub region: Region,
-}
-
-/// `plugins` subcommands.
-#[derive(Debug, Subcommand)]
-pub enum Plugins {
-    /// List plugins by kind; runs no code of plugin files
-    List {
-        /// Also say which directories were searched and why a file was skipped
-        #[arg(long, short)]
-        verbose: bool,
-    },
-    /// Describe a plugin and its settings; loads an allowed plugin file
-    Info {
-        /// Name, as list prints it
-        name: String,
-    },
 }
 
 /// Arguments of `fsck`.

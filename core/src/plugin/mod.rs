@@ -1,11 +1,13 @@
 //! Plugin host: finds, loads and calls matchers, detectors and estimators through the C ABI. `docs/plugin-guide.md` has
 //! the rules of the line, `schema/include/resurvey_plugin.h` its words.
 //!
-//! The only `unsafe` of core is here, in `open`, `instance`, `kinds`, `lend`, `results` and `service_table`.
+//! The only `unsafe` of core is here, in `open`, `instance`, `kinds`, `lend`, `results` and `service_table`, and in
+//! `examine`, which tries what a plugin does with the memory it is lent.
 
 mod check;
 mod declaration;
 mod error;
+pub mod examine;
 mod info;
 mod input;
 mod instance;

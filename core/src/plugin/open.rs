@@ -116,7 +116,7 @@ impl Plugin {
 
 /// Opens the file and finds its declaration. It stays open for the life of the process: closing a library that has
 /// started threads or has thread-local values crashes.
-fn open_library(path: &Path, declared: &Declared) -> Result<&'static Declaration, Fault> {
+pub(super) fn open_library(path: &Path, declared: &Declared) -> Result<&'static Declaration, Fault> {
     let fault = |reason: String| (Stage::Symbol, reason, "ask its author for a build for this system".to_owned());
     #[cfg(unix)]
     let library = {

@@ -176,7 +176,7 @@ fn examine(path: &Path, allowed: &HashSet<Digest>) -> (Option<String>, Result<Ca
 }
 
 /// The real path and the bytes of a file.
-fn read(path: &Path) -> Result<(PathBuf, Vec<u8>), Fault> {
+pub(super) fn read(path: &Path) -> Result<(PathBuf, Vec<u8>), Fault> {
     let unreadable = |error: std::io::Error| (Stage::File, error.to_string(), "check path and permissions".to_owned());
     // The system looks along its own search path for a name without a directory: open the real path alone.
     let path = path.canonicalize().map_err(unreadable)?;
@@ -187,7 +187,7 @@ fn read(path: &Path) -> Result<(PathBuf, Vec<u8>), Fault> {
     Ok((path, bytes))
 }
 
-fn refusal(path: &Path, (stage, reason, advice): Fault) -> Refusal {
+pub(super) fn refusal(path: &Path, (stage, reason, advice): Fault) -> Refusal {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     Refusal { name, path: Some(path.to_owned()), stage, reason, advice }
 }

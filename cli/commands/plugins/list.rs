@@ -1,24 +1,15 @@
-//! `resurvey plugins`.
+//! `resurvey plugins list` and `resurvey plugins info`.
 
-use crate::args::{PluginSearch, Plugins};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
-use crate::tools::{load, registry};
+use crate::tools::load;
 use comfy_table::{Table, presets};
 use resurvey_core::plugin::Registry;
 use serde_json::json;
 
-/// Lists or describes plugins.
-pub fn run(command: &Plugins, search: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let registry = registry(search)?;
-    match command {
-        Plugins::List { verbose } => list(&registry, *verbose, console),
-        Plugins::Info { name } => info(&registry, name, console),
-    }
-}
-
-fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Result<u8, Failure> {
+/// Lists what can be loaded, and with `is_verbose` where it was looked for and why a file was skipped.
+pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Result<u8, Failure> {
     let plugins = registry.list();
     if console.is_json() {
         let skipped: Vec<_> = (registry.skipped().iter())
@@ -56,7 +47,8 @@ fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Res
     Ok(0)
 }
 
-fn info(registry: &Registry, name: &str, console: &mut Console<'_>) -> Result<u8, Failure> {
+/// Describes one plugin.
+pub fn info(registry: &Registry, name: &str, console: &mut Console<'_>) -> Result<u8, Failure> {
     let plugin = load(registry, name)?;
     let info = plugin.info();
     let settings = plugin.schema().iter();

@@ -1,0 +1,79 @@
+//! Arguments of `plugins`.
+
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// `plugins` subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Plugins {
+    /// List plugins by kind; runs no code of plugin files
+    List {
+        /// Also say which directories were searched and why a file was skipped
+        #[arg(long, short)]
+        verbose: bool,
+    },
+    /// Describe a plugin and its settings; loads an allowed plugin file
+    Info {
+        /// Name, as list prints it
+        name: String,
+    },
+    /// Put a plugin file to every test of the plugin line; changes nothing
+    ///
+    /// Runs the code of the file, whether or not it is allowed, each test in a process of its own with a time and a memory
+    /// limit. Exit code 12 when a test fails.
+    Check(Check),
+    /// Copy a plugin file to the user's data directory and allow it
+    ///
+    /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; an older build of
+    /// the same name is taken away.
+    Install(Install),
+    /// Take an installed plugin away, from the user's data directory and from allowed-plugins
+    Remove {
+        /// Name of the plugin, or SHA-256 of one build
+        #[arg(value_name = "NAME|SHA256")]
+        which: String,
+    },
+}
+
+/// Arguments of `plugins check`.
+#[derive(Debug, Args)]
+pub struct Check {
+    /// Library of the plugin
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub limits: Limits,
+    /// Only this test, in this process
+    #[arg(long, hide = true, requires = "report")]
+    pub trial: Option<String>,
+    /// Where that test writes what it does
+    #[arg(long, hide = true, requires = "trial")]
+    pub report: Option<PathBuf>,
+}
+
+/// What one test of a plugin may use.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Limits {
+    /// Seconds for each test
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
+    pub time_limit: f64,
+    /// Address space for each test, MiB
+    #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = clap::value_parser!(u64).range(256..=1 << 20))]
+    pub memory_limit: u64,
+}
+
+/// Arguments of `plugins install`.
+#[derive(Debug, Args)]
+pub struct Install {
+    /// Library of the plugin
+    pub file: PathBuf,
+    /// Do not run the tests of plugins check first
+    #[arg(long)]
+    pub no_check: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let value: Option<f64> = text.parse().ok();
+    value.filter(|value| (0.1..=3600.0).contains(value)).ok_or_else(|| "expected 0.1 to 3600".to_owned())
+}

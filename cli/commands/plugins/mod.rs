@@ -1,0 +1,22 @@
+//! `resurvey plugins`.
+
+mod check;
+mod list;
+mod place;
+mod process;
+mod trial;
+
+use crate::args::{PluginSearch, Plugins};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::tools::registry;
+
+/// Lists, describes, checks, installs or removes plugins.
+pub fn run(command: &Plugins, search: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    match command {
+        Plugins::List { verbose } => list::list(&registry(search)?, *verbose, console),
+        Plugins::Info { name } => list::info(&registry(search)?, name, console),
+        Plugins::Check(options) => check::run(options, console),
+        _ => Ok(1),
+    }
+}
