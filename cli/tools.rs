@@ -1,6 +1,7 @@
 //! Plugins and their settings as the command line chooses them.
 
 use crate::args::{PluginSearch, Settings};
+use crate::commands::plugins::installed::{ALLOWED, directories};
 use crate::failure::Failure;
 use anyhow::anyhow;
 use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
@@ -10,8 +11,6 @@ use std::path::{Path, PathBuf};
 
 /// Colon-separated directories of plugin libraries.
 const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
-/// The file in the user's data directory with the SHA-256 of every library that may be loaded, one a line.
-const ALLOWED: &str = "allowed-plugins";
 
 /// Names in `--set NAME.KEY=VALUE` that are not plugins.
 const GATE: &str = "gate";
@@ -36,8 +35,12 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         registry.add_builtin(declaration)?;
     }
     let from_path = std::env::var_os(PLUGIN_PATH).map(|path| std::env::split_paths(&path).collect::<Vec<_>>());
-    let installed = data.map(|data| data.join("plugins")).filter(|directory| directory.is_dir());
-    for directory in search.plugin_dir.iter().cloned().chain(from_path.into_iter().flatten()).chain(installed) {
+    let plugins = data.map(|data| data.join("plugins")).filter(|directory| directory.is_dir());
+    // Each installed library has a directory of its own.
+    let installed: Vec<PathBuf> =
+        plugins.iter().flat_map(|all| directories(all)).map(|(_, directory)| directory).collect();
+    let own = plugins.into_iter().chain(installed);
+    for directory in search.plugin_dir.iter().cloned().chain(from_path.into_iter().flatten()).chain(own) {
         registry.add_directory(&directory);
     }
     Ok(registry)
@@ -59,7 +62,7 @@ pub fn load(registry: &Registry, name: &str) -> Result<Plugin, Failure> {
 }
 
 /// Where this user's plugins are kept.
-fn data_directory() -> Option<PathBuf> {
+pub fn data_directory() -> Option<PathBuf> {
     let named = |key: &str| std::env::var_os(key).filter(|value| !value.is_empty()).map(PathBuf::from);
     let base = named("XDG_DATA_HOME").or_else(|| Some(named("HOME")?.join(".local/share")))?;
     Some(base.join("resurvey"))

@@ -249,8 +249,8 @@ fn a_file_that_is_not_on_the_list_is_refused_by_name_with_its_digest() {
     assert!(registry.list().is_empty());
     let message = registry.load("agreement").unwrap_err().to_string();
     let expected = format!(
-        "refused libagreement.so at allow-list: SHA-256 {digest} is not on the list of allowed plugins · if you trust {}, \
-         add --allow-plugin {digest}",
+        "refused libagreement.so at allow-list: SHA-256 {digest} is not on the list of allowed plugins · if you trust it, \
+         run \"resurvey plugins install {}\", or add --allow-plugin {digest}",
         path.canonicalize().unwrap().display(),
         digest = digest(&path)
     );

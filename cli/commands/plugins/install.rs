@@ -1,1 +1,155 @@
-//! x
+//! `resurvey plugins install`: checks a library, copies it to the user's data directory and allows it.
+
+use super::check::{Checked, check};
+use super::installed::{Installed, Library, failure};
+use crate::args::Install;
+use crate::console::Console;
+use crate::document;
+use crate::failure::{Failure, PLUGIN};
+use anyhow::anyhow;
+use resurvey_core::plugin::{Digest, PluginError, PluginInfo, Registry};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Installs a file. What is checked, hashed and kept is one copy, so that nobody can change it in between.
+pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let file = &options.file;
+    let bytes = std::fs::read(file).map_err(|error| failure(file, &error))?;
+    // Its own permissions and header first: their messages name the file that the user knows.
+    Registry::vet(file)?;
+    let info = Registry::inspect(file)?;
+    if let Some(builtin) = registry.list().iter().find(|other| other.builtin && other.name == info.name) {
+        let name = &builtin.name;
+        return Err(refused(&format!(
+            "{}: a built-in plugin is called {name}; build it under another name",
+            file.display()
+        )));
+    }
+    let installed = Installed::of_this_user()?;
+    let sha256 = Digest::of(&bytes);
+    let home = installed.plugins().join(sha256.to_string());
+    let copy = Copy::new(&installed.plugins(), &info, &bytes)?;
+    let checked = if options.no_check { None } else { Some(check(&copy.library, options.limits, console)?) };
+    if let Some(checked) = checked.as_ref().filter(|checked| checked.failed() > 0) {
+        return not_installed(file, checked, console);
+    }
+    let was_there = home.is_dir();
+    copy.keep(&home)?;
+    let is_new = installed.allow(sha256, &format!("{} {}", info.name, info.version))? || !was_there;
+    let replaced = replace(&installed, &info.name, sha256)?;
+    let library = home.join(library_name(&info.name));
+    let info = PluginInfo { path: Some(library), sha256, ..info };
+    say(&info, is_new, &replaced, checked.as_ref(), console)?;
+    Ok(0)
+}
+
+fn refused(text: &str) -> Failure {
+    Failure::new(PLUGIN, anyhow!("{text}"))
+}
+
+fn not_installed(file: &Path, checked: &Checked, console: &mut Console<'_>) -> Result<u8, Failure> {
+    if console.is_json() {
+        console.document(&json!({ "installed": false, "check": checked.document() }))?;
+    } else {
+        checked.print(console)?;
+    }
+    let failed = checked.failed();
+    Err(refused(&format!(
+        "{} is not installed: {failed} tests failed; --no-check installs it all the same",
+        file.display()
+    )))
+}
+
+/// Takes other builds of the same name away: of two, the one that counts would be a matter of chance.
+fn replace(installed: &Installed, name: &str, kept: Digest) -> Result<Vec<Library>, Failure> {
+    let is_other =
+        |library: &Library| library.sha256 != kept && library.info.as_ref().is_some_and(|info| info.name == name);
+    let others: Vec<Library> = installed.libraries().into_iter().filter(is_other).collect();
+    for other in &others {
+        installed.forbid(other.sha256)?;
+        std::fs::remove_dir_all(&other.directory).map_err(|error| failure(&other.directory, &error))?;
+    }
+    Ok(others)
+}
+
+fn say(
+    info: &PluginInfo,
+    is_new: bool,
+    replaced: &[Library],
+    checked: Option<&Checked>,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    if console.is_json() {
+        let mut document = document::plugin_info(info);
+        document["installed"] = json!(true);
+        document["was_installed"] = json!(!is_new);
+        document["replaced"] = replaced.iter().map(|other| json!(other.sha256.to_string())).collect();
+        document["check"] = checked.map_or(Value::Null, Checked::document);
+        return console.document(&document);
+    }
+    let path = info.path.as_deref().map(Path::display);
+    let what = if is_new { "installed" } else { "already installed" };
+    console.line(format_args!("{what} {} {} ({})", info.name, info.version, info.kind))?;
+    if let Some(path) = path {
+        console.line(format_args!("  {path}"))?;
+    }
+    for other in replaced {
+        console.line(format_args!("  replaces {}", other.sha256))?;
+    }
+    let tests = if checked.is_some() { "it passed every test" } else { "it was not checked" };
+    console.line(format_args!("  {tests}; \"resurvey plugins remove {}\" takes it away", info.name))
+}
+
+/// A copy of a library beside its place, gone unless it is kept.
+struct Copy {
+    directory: tempfile::TempDir,
+    library: PathBuf,
+}
+
+impl Copy {
+    fn new(plugins: &Path, info: &PluginInfo, bytes: &[u8]) -> Result<Self, Failure> {
+        let make = || -> std::io::Result<Self> {
+            std::fs::create_dir_all(plugins)?;
+            let directory = tempfile::Builder::new().prefix(".new-").tempdir_in(plugins)?;
+            let library = directory.path().join(library_name(&info.name));
+            std::fs::write(&library, bytes)?;
+            owned(directory.path(), 0o755)?;
+            owned(&library, 0o644)?;
+            std::fs::File::open(&library)?.sync_all()?;
+            Ok(Self { directory, library })
+        };
+        let copy = make().map_err(|error| failure(plugins, &error))?;
+        // Who may write the directories above may put another file in its place.
+        for above in [plugins, plugins.parent().unwrap_or(plugins)] {
+            Registry::vet(above).map_err(|error: PluginError| Failure::from(error).about(above))?;
+        }
+        Ok(copy)
+    }
+
+    /// Makes it `home` in one step; where that is there already, the same bytes are.
+    fn keep(self, home: &Path) -> Result<(), Failure> {
+        if home.is_dir() {
+            return Ok(());
+        }
+        std::fs::rename(self.directory.path(), home).map_err(|error| failure(home, &error))?;
+        // The directory has gone to its place: there is nothing left to remove.
+        let _ = self.directory.keep();
+        Ok(())
+    }
+}
+
+/// `libname.so`, as this system calls libraries.
+fn library_name(name: &str) -> String {
+    format!("{}{}{}", std::env::consts::DLL_PREFIX, name.replace('-', "_"), std::env::consts::DLL_SUFFIX)
+}
+
+#[cfg(unix)]
+fn owned(path: &Path, mode: u32) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn owned(_: &Path, _: u32) -> std::io::Result<()> {
+    Ok(())
+}

@@ -1,9 +1,12 @@
 //! `resurvey plugins`.
 
 mod check;
+mod install;
+pub mod installed;
 mod list;
 mod place;
 mod process;
+mod remove;
 mod trial;
 
 use crate::args::{PluginSearch, Plugins};
@@ -17,6 +20,7 @@ pub fn run(command: &Plugins, search: &PluginSearch, console: &mut Console<'_>) 
         Plugins::List { verbose } => list::list(&registry(search)?, *verbose, console),
         Plugins::Info { name } => list::info(&registry(search)?, name, console),
         Plugins::Check(options) => check::run(options, console),
-        _ => Ok(1),
+        Plugins::Install(options) => install::run(options, &registry(search)?, console),
+        Plugins::Remove { which } => remove::run(which, console),
     }
 }

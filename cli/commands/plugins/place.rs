@@ -71,7 +71,7 @@ impl Stage for Street {
         let capture = |world: &World| Capture {
             labels: view(world.scene(true), &camera, &pose).labels,
             label_bytes: Vec::new(),
-            camera: camera.clone(),
+            camera,
             prior,
             taken_at: None,
             digest: Digest::of(&[]),
@@ -168,8 +168,8 @@ fn windows(columns: u32, rows: u32, seed: usize) -> LabelImage {
         for u in 0..columns {
             let number = u * 7 + v * 3 + 5 * seed as u32;
             let up = rows - v;
-            if up > 6 && v % 2 == 1 && number % 3 != 0 {
-                labels.set(u, v, if number % 5 == 0 { METAL.0 } else { GLASS.0 });
+            if up > 6 && v % 2 == 1 && !number.is_multiple_of(3) {
+                labels.set(u, v, if number.is_multiple_of(5) { METAL.0 } else { GLASS.0 });
             } else if up <= 2 && u == columns - 2 {
                 labels.set(u, v, METAL.0);
             }

@@ -135,6 +135,11 @@ impl Registry {
         found.map_err(|fault| refusal(path, fault).into())
     }
 
+    /// Refuses a file or directory that others may write, or replace.
+    pub fn vet(path: &Path) -> Result<(), PluginError> {
+        trust::check_permissions(path).map_err(|fault| refusal(path, fault).into())
+    }
+
     /// The plugin in the library at `path`, under the same rules.
     pub fn load_file(&self, path: &Path) -> Result<Plugin, PluginError> {
         let opened = examine(path, &self.allowed).1.and_then(|candidate| {

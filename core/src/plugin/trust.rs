@@ -23,7 +23,8 @@ pub(super) fn check_allowed(path: &Path, sha256: Digest, allowed: &HashSet<Diges
     if allowed.contains(&sha256) {
         return Ok(());
     }
-    let advice = format!("if you trust {}, add --allow-plugin {sha256}", path.display());
+    let file = path.display();
+    let advice = format!("if you trust it, run \"resurvey plugins install {file}\", or add --allow-plugin {sha256}");
     Err((Stage::AllowList, format!("SHA-256 {sha256} is not on the list of allowed plugins"), advice))
 }
 

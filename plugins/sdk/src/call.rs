@@ -128,8 +128,10 @@ unsafe extern "C" fn destroy<T: Plugin>(instance: *mut Instance) {
         // Whatever a panic left half done is not touched again.
         std::mem::forget(held);
     } else {
-        // A destructor that panics has nobody to tell.
-        let _ = caught(|| drop(held));
+        // `destroy` has no place for an error: whoever reads standard error is told.
+        if let Err(text) = caught(|| drop(held)) {
+            eprintln!("plugin {} panicked in destroy: {text}", T::NAME);
+        }
     }
 }
 

@@ -98,10 +98,12 @@ fn surveyed(pose: Pose) -> PoseEstimate {
     }
 }
 
-/// Where exactly one of photo and view shows `class`.
+/// Where exactly one of photo and view shows `class`; void is never a change.
 fn difference(photo: &LabelImage, view: &LabelImage, class: ClassId) -> Option<ChangeRegion> {
-    let differs =
-        |u: u32, v: u32| photo.at(u, v) != view.at(u, v) && [photo.at(u, v), view.at(u, v)].contains(&class.0);
+    let differs = |u: u32, v: u32| {
+        let both = [photo.at(u, v), view.at(u, v)];
+        both[0] != both[1] && both.contains(&class.0) && both[0] != ClassId::VOID.0
+    };
     let all = (0..photo.height()).flat_map(|v| (0..photo.width()).map(move |u| (u, v)));
     let changed: Vec<(u32, u32)> = all.filter(|&(u, v)| differs(u, v)).collect();
     let &(first_u, first_v) = changed.first()?;

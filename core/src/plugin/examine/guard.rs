@@ -19,8 +19,8 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// `bytes`, aligned to 8, called `name` in messages; `None` when the system has no more memory.
-    pub(super) fn new(name: &'static str, bytes: &[u8]) -> Option<Self> {
+    /// `bytes`, aligned to `alignment` (at most 8), called `name` in messages; `None` when the system has no more memory.
+    pub(super) fn new(name: &'static str, bytes: &[u8], alignment: usize) -> Option<Self> {
         // SAFETY: asks for a number.
         let page = usize::try_from(unsafe { libc::sysconf(libc::_SC_PAGESIZE) }).ok()?;
         let writable = bytes.len().max(1).next_multiple_of(8).next_multiple_of(page);
@@ -36,8 +36,8 @@ impl Block {
         unsafe { libc::mprotect(base.add(writable).cast(), page, libc::PROT_NONE) };
         // SAFETY: `writable` bytes were mapped, and nobody else knows them.
         unsafe { base.write_bytes(CANARY, writable) };
-        // SAFETY: the length, rounded up to 8, is not above `writable`.
-        let data = unsafe { base.add(writable - bytes.len().next_multiple_of(8)) };
+        // SAFETY: the length, rounded up to 8 at most, is not above `writable`.
+        let data = unsafe { base.add(writable - bytes.len().next_multiple_of(alignment)) };
         // SAFETY: `bytes.len()` bytes are writable at `data`, and new memory overlaps nothing.
         unsafe { data.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
         let slot = fault::watch(name, base as usize, data as usize + bytes.len(), base as usize + writable + page);

@@ -13,7 +13,7 @@ pub(super) struct Block {
 
 impl Block {
     /// `bytes`, aligned to 8.
-    pub(super) fn new(_: &'static str, bytes: &[u8]) -> Option<Self> {
+    pub(super) fn new(_: &'static str, bytes: &[u8], _: usize) -> Option<Self> {
         let words = bytes.len().div_ceil(8) + 2 * MARGIN / 8;
         let all = Box::leak(vec![u64::from_ne_bytes([CANARY; 8]); words].into_boxed_slice());
         for (index, chunk) in bytes.chunks(8).enumerate() {

@@ -73,8 +73,8 @@ impl Lent {
         self.blocks.iter().for_each(Block::close);
     }
 
-    fn bytes(&mut self, name: &'static str, bytes: &[u8]) -> Result<*mut u8, Finding> {
-        let block = Block::new(name, bytes).ok_or_else(no_memory)?;
+    fn bytes(&mut self, name: &'static str, bytes: &[u8], alignment: usize) -> Result<*mut u8, Finding> {
+        let block = Block::new(name, bytes, alignment).ok_or_else(no_memory)?;
         let data = block.data();
         self.blocks.push(block);
         Ok(data)
@@ -88,14 +88,14 @@ impl Lent {
         older: usize,
     ) -> Result<*const T, Finding> {
         let bytes = struct_bytes(&value, self.layout.host, older);
-        Ok(self.bytes(name, &bytes)?.cast_const().cast())
+        Ok(self.bytes(name, &bytes, align_of::<T>())?.cast_const().cast())
     }
 
     fn values<T: Copy>(&mut self, name: &'static str, values: &[T]) -> Result<*const T, Finding> {
         // SAFETY: the values of these types are numbers and pointers without padding between them, or with padding that
         // is copied as it comes.
         let bytes = unsafe { std::slice::from_raw_parts(values.as_ptr().cast::<u8>(), size_of_val(values)) };
-        Ok(self.bytes(name, bytes)?.cast_const().cast())
+        Ok(self.bytes(name, bytes, align_of::<T>())?.cast_const().cast())
     }
 
     fn image<T: Copy>(&mut self, name: &'static str, raster: &Raster<T>, fill: T) -> Result<abi::Image, Finding> {
@@ -147,7 +147,7 @@ impl Lent {
             photo: self.growing("photo", photo, size_of::<abi::Photo>())?,
             view,
             comparison: self.growing("comparison", comparison, size_of::<abi::Comparison>())?,
-            regions: self.bytes("regions", &regions)?.cast_const().cast(),
+            regions: self.bytes("regions", &regions, align_of::<abi::Region>())?.cast_const().cast(),
             region_count: exhibit.regions.len(),
             region_step,
         })

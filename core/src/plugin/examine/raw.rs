@@ -35,7 +35,9 @@ struct Place(Block);
 
 impl Place {
     fn new(name: &'static str, bytes: &[u8]) -> Result<Self, Finding> {
-        let block = Block::new(name, bytes);
+        // Texts may stand anywhere, structs and numbers may not.
+        let alignment = if bytes.len().is_multiple_of(8) { 8 } else { 1 };
+        let block = Block::new(name, bytes, alignment);
         block.map(Self).ok_or_else(|| Finding::failed("the system has no memory for the trial", "try again"))
     }
 
