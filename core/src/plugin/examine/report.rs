@@ -105,8 +105,11 @@ impl Ended {
     }
 
     fn broken_off(&self, how: &How, step: &str) -> Finding {
-        let last_words =
-            self.messages.lines().rev().find(|line| !line.trim().is_empty() && !line.contains("RUST_BACKTRACE"));
+        let last_words = self
+            .messages
+            .lines()
+            .rev()
+            .find(|line| !line.trim().is_empty() && !line.to_lowercase().contains("backtrace"));
         let said = last_words.map_or_else(String::new, |line| format!(": {}", line.trim()));
         match how {
             How::Exited(code) => Finding::failed(
@@ -152,5 +155,59 @@ fn signal_words(signal: i32) -> (&'static str, &'static str) {
         9 => ("killed", "use less memory: the limit of a check is --memory-limit"),
         11 => ("segmentation fault", "stay inside the images and check pointers for null"),
         _ => ("by the system", "run it in a debugger"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ended(how: How, report: &str) -> Ended {
+        Ended { how, report: report.to_owned(), output: String::new(), messages: String::new() }
+    }
+
+    fn problem(ended: &Ended) -> String {
+        match ended.finding() {
+            Finding::Failed { problem, .. } => problem,
+            other => panic!("expected a failure, found {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_process_that_ends_without_a_verdict_failed_where_the_last_whole_line_says() {
+        let report = "step\tin create\nstep\tin score\nstep\tin dest";
+        assert_eq!(problem(&ended(How::Exited(0), report)), "ended the whole process with exit code 0 in score");
+        let killed = Ended { messages: "one\nlast words\n".into(), ..ended(How::Signalled(6), report) };
+        assert_eq!(problem(&killed), "ended the whole process with signal 6 (abort) in score: last words");
+        let limit = Duration::from_millis(1500);
+        assert_eq!(problem(&ended(How::TimedOut(limit), report)), "did not return within 1.5 s in score");
+        assert!(problem(&ended(How::Exited(3), "")).ends_with("exit code 3 before the first call"));
+    }
+
+    #[test]
+    fn a_verdict_counts_when_the_process_ends_well_and_quietly() {
+        let passed = ended(How::Exited(0), "step\tin score\npassed\tscore 1\n");
+        assert_eq!(passed.finding(), Finding::Passed("score 1".into()));
+        let loud = Ended { output: "hello\n".into(), ..passed.clone() };
+        assert!(problem(&loud).contains("standard output has \"hello\""));
+        let panicked = Ended { messages: "plugin x panicked in destroy: no\n".into(), ..passed.clone() };
+        assert_eq!(problem(&panicked), "plugin x panicked in destroy: no");
+        let crashed = Ended { how: How::Signalled(11), ..passed };
+        assert!(problem(&crashed).ends_with("after the last call, when the process ended"));
+    }
+
+    #[test]
+    fn a_fault_on_lent_memory_comes_before_all_else() {
+        let report = "step\tin score\nfault\tphoto\twritten to\n";
+        assert_eq!(problem(&ended(How::Exited(98), report)), "photo was written to (in score)");
+    }
+
+    #[test]
+    fn a_text_with_line_breaks_stays_one_line_of_the_report() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let finding = Finding::failed("one\ntwo\tthree", "do\nit");
+        Report::new(file.reopen().unwrap()).end(&finding);
+        let report = std::fs::read_to_string(file.path()).unwrap();
+        assert_eq!(ended(How::Exited(0), &report).finding(), Finding::failed("one two three", "do it"));
     }
 }
