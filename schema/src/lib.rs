@@ -13,6 +13,7 @@ pub mod position;
 pub mod region;
 pub mod service;
 pub mod sql;
+pub mod wire;
 
 pub use camera::{CameraModel, Intrinsics};
 pub use capture::{CameraFile, CaptureFile, PriorFile};
