@@ -10,6 +10,7 @@ pub use plugins::{Check, Install, Limits, Plugins};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
+use resurvey_core::plugin::Isolation;
 use resurvey_core::version::{PluginBuild, parse_moment};
 use std::path::PathBuf;
 
@@ -38,6 +39,24 @@ pub struct PluginSearch {
     /// SHA-256 of a plugin library that may be loaded, as "plugins list --verbose" prints it; may be given again
     #[arg(long, global = true, value_name = "SHA256")]
     pub allow_plugin: Vec<String>,
+    /// Seconds of its own that a plugin from a file has for one call, e.g. 30
+    #[arg(long, global = true, value_name = "SECONDS", default_value_t = Isolation::DEFAULT_CALL_LIMIT_S, value_parser = seconds)]
+    pub plugin_timeout: f64,
+    /// Address space of the process of a plugin from a file, MiB, e.g. 2048; 0 is no limit
+    #[arg(long, global = true, value_name = "MIB", default_value_t = Isolation::DEFAULT_MEMORY_MIB)]
+    pub plugin_memory: u64,
+    /// Open plugin libraries in this process: faster to start, and a crash of theirs is one of resurvey
+    #[arg(long, global = true)]
+    pub in_process: bool,
+    /// The program that runs plugins in processes of their own
+    #[arg(skip)]
+    pub program: Option<PathBuf>,
+}
+
+/// A time above zero that a clock can count to.
+fn seconds(text: &str) -> Result<f64, String> {
+    let parsed = text.parse::<f64>().ok().filter(|seconds| (0.001..=1e6).contains(seconds));
+    parsed.ok_or_else(|| format!("expected seconds from 0.001 to 1000000, found {text:?}"))
 }
 
 /// The commands.

@@ -105,6 +105,7 @@ pub fn plugin_info(info: &PluginInfo) -> Value {
         "sha256": info.sha256.to_string(),
         "path": info.path.as_ref().map(|path| path.display().to_string()),
         "builtin": info.builtin,
+        "process": info.is_apart,
     })
 }
 

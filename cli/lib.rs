@@ -21,6 +21,7 @@ use console::Console;
 use failure::{Failure, USAGE};
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::PathBuf;
 
 /// Runs one command line, `args[0]` being the program's name, and returns the exit code that `docs/cli.md` documents.
 pub fn run<I>(args: I, out: &mut dyn Write, err: &mut dyn Write) -> u8
@@ -28,20 +29,30 @@ where
     I: IntoIterator,
     I::Item: Into<OsString> + Clone,
 {
-    run_with_progress(args, out, err, false)
+    run_as(Host::default(), args, out, err)
 }
 
-/// The same, with progress bars on standard error when `shows_progress`.
-pub fn run_with_progress<I>(args: I, out: &mut dyn Write, err: &mut dyn Write, shows_progress: bool) -> u8
+/// What the program around a command line knows of itself.
+#[derive(Clone, Debug, Default)]
+pub struct Host {
+    /// Whether progress bars go to standard error.
+    pub shows_progress: bool,
+    /// The `resurvey` program, which runs plugins from files in processes of their own; without it they are refused.
+    pub program: Option<PathBuf>,
+}
+
+/// The same, for a program that says more of itself.
+pub fn run_as<I>(host: Host, args: I, out: &mut dyn Write, err: &mut dyn Write) -> u8
 where
     I: IntoIterator,
     I::Item: Into<OsString> + Clone,
 {
-    let cli = match Cli::try_parse_from(args) {
+    let mut cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
         Err(error) => return explain(&error, out, err),
     };
-    let mut console = Console::new(out, err, cli.json, shows_progress);
+    cli.plugins.program = host.program;
+    let mut console = Console::new(out, err, cli.json, host.shows_progress);
     let result = dispatch(&cli, &mut console)
         .or_else(|failure| tell(failure, &mut console))
         .and_then(|code| Ok(console.out().flush().map(|()| code)?));

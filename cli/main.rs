@@ -1,13 +1,20 @@
 //! The `resurvey` binary.
 #![forbid(unsafe_code)]
 
+use resurvey::Host;
+use resurvey_core::plugin::{SERVE, serve};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    let mut arguments = std::env::args_os().skip(1);
+    if arguments.next().is_some_and(|first| first == SERVE) {
+        return ExitCode::from(serve(arguments));
+    }
     let mut out = std::io::BufWriter::new(std::io::stdout());
     let mut err = std::io::stderr();
-    let shows_progress = err.is_terminal();
-    let code = resurvey::run_with_progress(std::env::args_os(), &mut out, &mut err, shows_progress);
+    // Where the system does not say what is running, plugins from files say so.
+    let host = Host { shows_progress: err.is_terminal(), program: std::env::current_exe().ok() };
+    let code = resurvey::run_as(host, std::env::args_os(), &mut out, &mut err);
     ExitCode::from(code)
 }

@@ -5,12 +5,15 @@ use crate::commands::plugins::installed::{ALLOWED, directories};
 use crate::failure::Failure;
 use anyhow::anyhow;
 use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
-use resurvey_core::plugin::{Assignment, Digest, Plugin, PluginError, PluginInfo, Registry};
+use resurvey_core::plugin::{Assignment, CrashLog, Digest, Isolation, Plugin, PluginError, PluginInfo, Registry};
 use resurvey_core::version::{ModelFile, PluginUse, SearchRange};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Colon-separated directories of plugin libraries.
 const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
+/// The file in the user's data directory with a line for every crash of a library: what crashed twice is not started again.
+pub const CRASHED: &str = "crashed-plugins";
 
 /// Names in `--set NAME.KEY=VALUE` that are not plugins.
 const GATE: &str = "gate";
@@ -25,6 +28,9 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         allowed.extend(list.lines().filter_map(|line| line.split_whitespace().next()?.parse::<Digest>().ok()));
     }
     let mut registry = Registry::new(allowed);
+    if !search.in_process {
+        registry.isolate(isolation(search, data.as_deref()));
+    }
     for declaration in [
         resurvey_semantic::plugin(),
         resurvey_skyline::plugin(),
@@ -44,6 +50,16 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         registry.add_directory(&directory);
     }
     Ok(registry)
+}
+
+/// How plugins from files are kept apart.
+fn isolation(search: &PluginSearch, data: Option<&Path>) -> Isolation {
+    Isolation {
+        program: search.program.clone(),
+        call_limit: Duration::from_secs_f64(search.plugin_timeout),
+        memory_mib: search.plugin_memory,
+        crashes: data.map(|data| CrashLog::new(&data.join(CRASHED))),
+    }
 }
 
 /// The plugin called `name`. Where there is none, a library file of that name that was refused is why.

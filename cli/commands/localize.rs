@@ -36,6 +36,8 @@ pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>
     let stage = console.stage("localize");
     let services = SceneServices::new(&world, &capture, crs, &stage);
     let located = localize(&mut matcher, &services, &choices.gate, &choices.search)?;
+    // A plugin that crashes as it ends has not kept its word either.
+    matcher.finish()?;
     timings.insert("localize".to_owned(), json!(console.finish(&stage)));
     if let Some(path) = &options.heatmap {
         let picture = heat_map(&HeatMap {

@@ -211,7 +211,7 @@ fn replay(
         review: None,
         search: None,
     };
-    let mut run = Run { map, crs, recording, timings: Map::new() };
+    let mut run = Run { map, crs, recording, timings: Map::new(), is_last: true };
     let work = Work { base: recorded.base, capture, world, prior: Value::Null };
     let (resolution, _, _) = run.compare(&work.world, &work.capture, &located, &mut comparers, console)?;
     let rejections = resolution.rejections.len();

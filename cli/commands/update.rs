@@ -36,7 +36,7 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
     let mut reports = options.report.as_deref().map(Reports::start).transpose()?;
     let mut documents = Vec::new();
     let mut code = Ok(NOTHING);
-    for path in &options.captures {
+    for (index, path) in options.captures.iter().enumerate() {
         let recording = Recording {
             dry_run: options.dry_run,
             keep_labels: options.keep_labels,
@@ -50,7 +50,8 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
             },
             search: Some(tools.choices.search_range()),
         };
-        let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new() };
+        let is_last = index + 1 == options.captures.len();
+        let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new(), is_last };
         match run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console) {
             Ok((document, of_capture)) => {
                 code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
@@ -136,6 +137,8 @@ pub(super) struct Run<'a> {
     pub(super) recording: Recording<'a>,
     /// Milliseconds of each stage.
     pub(super) timings: Map<String, Value>,
+    /// Whether the plugins are ended before the commit, so that one that crashes then changes nothing.
+    pub(super) is_last: bool,
 }
 
 /// What the map keeps of a run, and who says so.
@@ -236,6 +239,10 @@ impl Run<'_> {
             (Resolution::default(), None, None)
         };
         let outcome = Outcome { located, resolution, viewed_region, seen };
+        if self.is_last {
+            comparers.detector.finish()?;
+            comparers.estimator.finish()?;
+        }
         let stage = console.stage("commit");
         let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
@@ -256,6 +263,9 @@ impl Run<'_> {
         let stage = console.stage("localize");
         let services = SceneServices::new(world, capture, self.crs, &stage);
         let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search)?;
+        if self.is_last {
+            tools.matcher.finish()?;
+        }
         self.timings.insert("localize".to_owned(), json!(console.finish(&stage)));
         Ok(located)
     }

@@ -44,7 +44,8 @@ impl Run {
 pub fn resurvey<S: AsRef<str>>(arguments: &[S]) -> Run {
     let (mut out, mut err) = (Vec::new(), Vec::new());
     let words = std::iter::once("resurvey").chain(arguments.iter().map(AsRef::as_ref));
-    let code = resurvey::run(words, &mut out, &mut err);
+    let host = resurvey::Host { program: Some(env!("CARGO_BIN_EXE_resurvey").into()), ..Default::default() };
+    let code = resurvey::run_as(host, words, &mut out, &mut err);
     let text = |bytes| String::from_utf8(bytes).unwrap();
     Run { code, out: text(out), err: text(err) }
 }

@@ -17,7 +17,7 @@ fn the_built_in_plugins_are_listed_with_the_documented_keys() {
     ] {
         let plugin = plugins.iter().find(|plugin| plugin["name"] == name).unwrap();
         let keys: Vec<&String> = plugin.as_object().unwrap().keys().collect();
-        assert_eq!(keys, ["name", "kind", "version", "summary", "sha256", "path", "builtin"]);
+        assert_eq!(keys, ["name", "kind", "version", "summary", "sha256", "path", "builtin", "process"]);
         assert_eq!((&plugin["kind"], &plugin["builtin"]), (&kind.into(), &true.into()));
         assert!(plugin["path"].is_null() && plugin["sha256"].as_str().unwrap().len() == 64);
         let info = resurvey(&["plugins", "info", name, "--json"]).ok().json();

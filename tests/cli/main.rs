@@ -20,6 +20,7 @@ mod map_files;
 mod models;
 mod page;
 mod plugin_check;
+mod plugin_faults;
 mod plugin_files;
 mod plugin_install;
 mod priors;

@@ -10,7 +10,7 @@ use std::process::Command;
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Compiles a fixture in C into the directory of `bench`, with its SHA-256; `None`, said aloud, without a compiler.
-fn plugin(bench: &Bench, source: &str, name: &str, flags: &[&str]) -> Option<String> {
+pub fn plugin(bench: &Bench, source: &str, name: &str, flags: &[&str]) -> Option<String> {
     let directory = bench.path("plugins");
     std::fs::create_dir_all(&directory).unwrap();
     let library = directory.join(format!("lib{name}.so"));
@@ -29,15 +29,16 @@ fn plugin(bench: &Bench, source: &str, name: &str, flags: &[&str]) -> Option<Str
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     restrict(&directory, 0o755);
     restrict(&library, 0o644);
-    Some(hex(&std::fs::read(&library).unwrap()))
+    Some(sha256(&std::fs::read(&library).unwrap()))
 }
 
 /// SHA-256 in hexadecimal digits.
-fn hex(bytes: &[u8]) -> String {
+pub fn sha256(bytes: &[u8]) -> String {
     sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn restrict(path: &Path, mode: u32) {
+/// Sets the mode of a file.
+pub fn restrict(path: &Path, mode: u32) {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -101,7 +102,7 @@ fn a_plugin_that_panics_is_exit_12_and_the_program_lives_on() {
         std::fs::write(&library, &bytes).unwrap();
         restrict(&directory, 0o755);
         restrict(&library, 0o644);
-        let (capture, sha256) = (street().path("capture/capture.json"), hex(&bytes));
+        let (capture, sha256) = (street().path("capture/capture.json"), sha256(&bytes));
         let setting = format!("fixture.mode={mode}");
         let arguments = [
             text(&capture),

@@ -169,7 +169,7 @@ pub fn read(map: &MapFile, path: &Path) -> Result<Work, Failure> {
 }
 
 fn run_on(map: &MapFile) -> Result<Run<'_>, Failure> {
-    Ok(Run { map, crs: crs_of(map)?, recording: RECORDING, timings: Map::new() })
+    Ok(Run { map, crs: crs_of(map)?, recording: RECORDING, timings: Map::new(), is_last: false })
 }
 
 /// Runs a stage that says nothing: the bar of the whole run is the only one.

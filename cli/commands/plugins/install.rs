@@ -36,6 +36,7 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let was_there = home.is_dir();
     copy.keep(&home)?;
     let is_new = installed.allow(sha256, &format!("{} {}", info.name, info.version))? || !was_there;
+    installed.forgive(sha256)?;
     let replaced = replace(&installed, &info.name, sha256)?;
     let library = home.join(library_name(&info.name));
     let info = PluginInfo { path: Some(library), sha256, ..info };

@@ -1,9 +1,9 @@
 //! The plugins in the user's data directory: `plugins/SHA256/LIBRARY`, and a line for each in `allowed-plugins`.
 
 use crate::failure::{Failure, MISSING};
-use crate::tools::data_directory;
+use crate::tools::{CRASHED, data_directory};
 use anyhow::anyhow;
-use resurvey_core::plugin::{Digest, PluginInfo, Registry};
+use resurvey_core::plugin::{CrashLog, Digest, PluginInfo, Registry};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -75,6 +75,12 @@ impl Installed {
             return Ok(false);
         }
         self.write(&kept).map(|()| true)
+    }
+
+    /// Forgets that `sha256` ever crashed.
+    pub fn forgive(&self, sha256: Digest) -> Result<(), Failure> {
+        let log = self.data.join(CRASHED);
+        CrashLog::new(&log).forget(sha256).map_err(|error| failure(&log, &error))
     }
 
     fn lines(&self) -> Result<Vec<String>, Failure> {

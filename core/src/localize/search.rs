@@ -72,13 +72,16 @@ pub(super) fn search(
     let skipped = ((all.len() - free.len()) * headings.len()) as u64;
     let mut scorer = Scorer::new(matcher, services, COARSE_SAMPLES);
     let (mut best, mut heat) = (Vec::new(), Vec::new());
-    for (index, position) in free.iter().enumerate() {
-        let poses: Vec<Pose> =
-            headings.iter().map(|yaw_rad| Pose { position: *position, yaw_rad: *yaw_rad, ..prior }).collect();
-        let mode = scorer.best_of(&poses)?;
-        heat.push([position.easting_m, position.northing_m, mode.score]);
+    let turned = |position: &GridPoint| {
+        let position = *position;
+        headings.iter().map(move |yaw_rad| Pose { position, yaw_rad: *yaw_rad, ..prior })
+    };
+    let poses: Vec<Pose> = free.iter().flat_map(turned).collect();
+    let scores = scorer.scores(&poses, &|done| services.progress(0.7 * done))?;
+    for (poses, scores) in poses.chunks(headings.len()).zip(scores.chunks(headings.len())) {
+        let mode = best_of(poses, scores);
+        heat.push([mode.pose.position.easting_m, mode.pose.position.northing_m, mode.score]);
         best.push(mode);
-        services.progress(0.7 * (index + 1) as f64 / free.len() as f64);
     }
     best.sort_by(|a, b| b.score.total_cmp(&a.score));
     best.truncate(MODES);
@@ -101,6 +104,17 @@ pub(super) fn search(
         skipped,
         heat,
     })
+}
+
+/// The best of `poses`, the first among equals; `poses` is not empty.
+fn best_of(poses: &[Pose], scores: &[f64]) -> Mode {
+    let mut best = Mode { pose: poses[0], score: f64::NEG_INFINITY };
+    for (pose, score) in poses.iter().zip(scores) {
+        if *score > best.score {
+            best = Mode { pose: *pose, score: *score };
+        }
+    }
+    best
 }
 
 fn positions(centre: GridPoint, radius_m: f64) -> Vec<GridPoint> {
@@ -136,35 +150,33 @@ impl<'a, 's> Scorer<'a, 's> {
         Self { matcher, services, photo: every(labels, stride), stride, scored: 0 }
     }
 
-    fn score(&mut self, pose: &Pose) -> Result<f64, PluginError> {
+    /// The score of every pose; `progress` hears which share of them is rendered.
+    fn scores(&mut self, poses: &[Pose], progress: &dyn Fn(f64)) -> Result<Vec<f64>, PluginError> {
         let scene = self.services.world().scene(true);
-        let view = view(scene, &self.services.capture().camera.subsampled(self.stride), pose);
-        self.scored += 1;
-        let images = ViewImages {
-            origin: view.origin,
-            labels: &view.labels,
-            range_m: &view.range_m,
-            points: &view.points,
-            features: &view.features,
-            feature_table: scene.feature_table(),
-        };
-        self.matcher.score(&self.photo, &images)
+        let camera = self.services.capture().camera.subsampled(self.stride);
+        self.scored += poses.len() as u64;
+        self.matcher.score_each(&self.photo, poses.len(), &mut |index, take| {
+            let view = view(scene, &camera, &poses[index]);
+            take(&ViewImages {
+                origin: view.origin,
+                labels: &view.labels,
+                range_m: &view.range_m,
+                points: &view.points,
+                features: &view.features,
+                feature_table: scene.feature_table(),
+            });
+            progress((index + 1) as f64 / poses.len() as f64);
+        })
     }
 
     /// The best of `poses`, the first among equals; `poses` is not empty.
     fn best_of(&mut self, poses: &[Pose]) -> Result<Mode, PluginError> {
-        let mut best = Mode { pose: poses[0], score: f64::NEG_INFINITY };
-        for pose in poses {
-            let score = self.score(pose)?;
-            if score > best.score {
-                best = Mode { pose: *pose, score };
-            }
-        }
-        Ok(best)
+        let scores = self.scores(poses, &|_| {})?;
+        Ok(best_of(poses, &scores))
     }
 
     fn climb(&mut self, start: Mode) -> Result<Mode, PluginError> {
-        let mut best = Mode { score: self.score(&start.pose)?, ..start };
+        let mut best = self.best_of(&[start.pose])?;
         let mut step = COARSE_M / 2.0;
         while step >= LAST_STEP {
             let around = [
@@ -191,8 +203,11 @@ impl<'a, 's> Scorer<'a, 's> {
     fn covariance(&mut self, best: &Mode) -> Result<[[f64; 3]; 3], PluginError> {
         let (mut sum, mut moments) = (0.0, [[0.0; 3]; 3]);
         let steps = || (-SPREAD_STEPS..=SPREAD_STEPS).map(f64::from);
-        for (east, north, turn) in steps().flat_map(|e| steps().flat_map(move |n| steps().map(move |t| (e, n, t)))) {
-            let score = self.score(&shifted(&best.pose, [east, north, turn]))?;
+        let offsets: Vec<[f64; 3]> =
+            steps().flat_map(|e| steps().flat_map(move |n| steps().map(move |t| [e, n, t]))).collect();
+        let poses: Vec<Pose> = offsets.iter().map(|offset| shifted(&best.pose, *offset)).collect();
+        let scores = self.scores(&poses, &|_| {})?;
+        for ([east, north, turn], score) in offsets.into_iter().zip(scores) {
             let weight = (EVIDENCE * (score - best.score)).min(0.0).exp();
             let offset = [east, north, turn.to_radians()];
             for (row, a) in moments.iter_mut().zip(offset) {

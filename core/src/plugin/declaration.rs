@@ -11,12 +11,20 @@ use std::mem::offset_of;
 /// A declaration whose header is one that this host can load.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Declared {
+    /// Of a library.
     pub symbol: String,
     pub header: [u8; HEADER_BYTES],
     pub kind: Kind,
     pub name: String,
     pub version: String,
     pub summary: String,
+}
+
+impl Declared {
+    /// Whether it is an executable that speaks the wire, and no library.
+    pub(super) fn is_executable(&self) -> bool {
+        self.header == [0; HEADER_BYTES]
+    }
 }
 
 /// Stage, reason, advice.
@@ -125,8 +133,7 @@ fn read_texts(bytes: &[u8], symbol: &str) -> Result<Declared, Fault> {
     let (name_at, version_at) = (offset_of!(Declaration, name), offset_of!(Declaration, version));
     let summary_at = offset_of!(Declaration, summary);
     let name = text("its name", name_at, version_at)?;
-    let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-    if name.is_empty() || !name.chars().all(allowed) {
+    if !allowed_name(&name) {
         return Err(fault(format!("expected a name of a–z, 0–9 and dashes, found {name:?}")));
     }
     let number = u16::from_ne_bytes([bytes[KIND_OFFSET], bytes[KIND_OFFSET + 1]]);
@@ -144,6 +151,12 @@ fn read_texts(bytes: &[u8], symbol: &str) -> Result<Declared, Fault> {
         version: text("its version", version_at, summary_at)?,
         summary: text("its summary", summary_at, size_of::<Declaration>())?,
     })
+}
+
+/// Whether a plugin may have this name.
+pub(super) fn allowed_name(name: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    !name.is_empty() && name.chars().all(allowed)
 }
 
 const KIND_OFFSET: usize = offset_of!(abi::Header, kind);

@@ -42,7 +42,7 @@ pub enum PluginError {
     Panicked {
         /// Its name.
         plugin: String,
-        /// `create`, `score`, `search`, `detect` or `estimate`.
+        /// `load`, `create`, `score`, `search`, `detect`, `estimate` or `destroy`.
         call: &'static str,
         /// Message, file and line.
         text: String,
@@ -71,7 +71,39 @@ pub enum PluginError {
         /// As in [`Panicked`](Self::Panicked).
         call: &'static str,
     },
-    /// The caller's rasters do not belong together.
+    /// The process of the plugin died, or left.
+    #[error("plugin {plugin} crashed in {call}: {how}")]
+    Crashed {
+        /// Its name.
+        plugin: String,
+        /// As in [`Panicked`](Self::Panicked).
+        call: &'static str,
+        /// Signal or exit code, and what it said last.
+        how: String,
+    },
+    /// The process of the plugin said something that is no message, or not its turn.
+    #[error("plugin {plugin} broke the wire in {call}: expected {expected}, found {found}")]
+    Garbled {
+        /// Its name.
+        plugin: String,
+        /// As in [`Panicked`](Self::Panicked).
+        call: &'static str,
+        /// What could have come.
+        expected: String,
+        /// The beginning of what came.
+        found: String,
+    },
+    /// The plugin did not return in time; its process was ended.
+    #[error("plugin {plugin} did not return from {call} within {limit_s} s; --plugin-timeout SECONDS gives it longer")]
+    TimedOut {
+        /// Its name.
+        plugin: String,
+        /// As in [`Panicked`](Self::Panicked).
+        call: &'static str,
+        /// The limit, seconds.
+        limit_s: f64,
+    },
+    /// The caller's rasters do not belong together, or there is no process for the plugin.
     #[error("plugin {plugin} was not called: {text}")]
     InvalidInput {
         /// Its name.
@@ -120,6 +152,8 @@ pub enum Stage {
     Permissions,
     /// Its SHA-256 is on the user's list.
     AllowList,
+    /// It did not crash twice before.
+    Quarantine,
     /// It is a library with one declaration.
     Header,
     /// It speaks this version of the line.
@@ -132,12 +166,32 @@ pub enum Stage {
     Settings,
 }
 
+impl Stage {
+    const ALL: [Self; 9] = [
+        Self::File,
+        Self::Permissions,
+        Self::AllowList,
+        Self::Quarantine,
+        Self::Header,
+        Self::Abi,
+        Self::Symbol,
+        Self::Entry,
+        Self::Settings,
+    ];
+
+    /// The gate that messages call `name`.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|stage| stage.to_string() == name)
+    }
+}
+
 impl std::fmt::Display for Stage {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str(match self {
             Self::File => "file",
             Self::Permissions => "permissions",
             Self::AllowList => "allow-list",
+            Self::Quarantine => "quarantine",
             Self::Header => "header",
             Self::Abi => "abi",
             Self::Symbol => "symbol",

@@ -22,6 +22,8 @@ pub struct PluginInfo {
     pub path: Option<PathBuf>,
     /// Whether it is part of this program.
     pub builtin: bool,
+    /// Whether it runs in a process of its own.
+    pub is_apart: bool,
     /// JSON schema of its settings; `None` for a file that is not loaded yet, because asking would run its code.
     pub settings_schema: Option<String>,
 }

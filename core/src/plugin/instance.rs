@@ -36,6 +36,7 @@ impl ErrorBuffer {
 #[derive(Debug)]
 pub(super) struct Instance {
     plugin: Plugin,
+    table: abi::Table,
     pointer: *mut abi::Instance,
     poisoned: bool,
     error: ErrorBuffer,
@@ -45,9 +46,10 @@ pub(super) struct Instance {
 unsafe impl Send for Instance {}
 
 impl Instance {
-    pub(super) fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
-        let create = plugin.table().create.expect("invariant: `enter` refuses a table without create");
-        let mut instance = Self { plugin, pointer: null_mut(), poisoned: false, error: ErrorBuffer::new() };
+    /// An instance of `plugin`, whose entry filled in `table`.
+    pub(super) fn create(plugin: Plugin, table: abi::Table, settings: &Settings) -> Result<Self, PluginError> {
+        let create = table.create.expect("invariant: `enter` refuses a table without create");
+        let mut instance = Self { plugin, table, pointer: null_mut(), poisoned: false, error: ErrorBuffer::new() };
         let mut error = instance.error.lend();
         let text = Text::of(settings.as_json());
         // SAFETY: the function came from the plugin's own entry; text, place and buffer live until it returns.
@@ -75,7 +77,7 @@ impl Instance {
             return Err(PluginError::Poisoned { plugin: self.name() });
         }
         let mut error = self.error.lend();
-        let status = body(self.plugin.table(), self.pointer, &raw mut error);
+        let status = body(&self.table, self.pointer, &raw mut error);
         if status == STATUS_OK {
             return Ok(());
         }
@@ -108,7 +110,7 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        if let Some(destroy) = self.plugin.table().destroy
+        if let Some(destroy) = self.table.destroy
             && !self.pointer.is_null()
         {
             // SAFETY: the instance came from `create` of the same table and is ended here, once.

@@ -1,19 +1,17 @@
 //! Matchers, detectors and estimators as the rest of core calls them. Every answer is checked before it is given on.
 #![allow(unsafe_code)]
 
-use super::check::{self, Rules};
 use super::error::PluginError;
 use super::info::PluginInfo;
 use super::input::{ComparisonInput, PhotoInput, ViewImages};
 use super::instance::Instance;
-use super::lend;
-use super::open::Plugin;
-use super::results::{self, Collected, Collector};
-use super::service_table::ServiceTable;
+use super::open::{Code, Plugin};
+use super::process::{Apart, MakeView};
 use super::services::Services;
 use super::settings::Settings;
+use super::{lend, line};
 use crate::image::LabelImage;
-use resurvey_schema::abi::{self, Growing, STATUS_UNSUPPORTED, Status};
+use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::{ChangeRegion, Localization, Proposal};
 
 /// Who drives the search.
@@ -25,13 +23,47 @@ pub enum MatcherForm {
     Search,
 }
 
+/// An instance, in this process or another.
+#[derive(Debug)]
+enum Body {
+    Here(Box<Instance>),
+    Apart(Box<Apart>),
+}
+
+impl Body {
+    fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
+        match plugin.code().clone() {
+            Code::Here(table) => Ok(Self::Here(Box::new(Instance::create(plugin, table, settings)?))),
+            Code::Apart(program) => Ok(Self::Apart(Box::new(Apart::create(plugin, program, settings)?))),
+        }
+    }
+
+    fn plugin(&self) -> &Plugin {
+        match self {
+            Self::Here(instance) => instance.plugin(),
+            Self::Apart(instance) => instance.plugin(),
+        }
+    }
+
+    fn finish(&mut self) -> Result<(), PluginError> {
+        match self {
+            Self::Here(_) => Ok(()),
+            Self::Apart(instance) => instance.finish(),
+        }
+    }
+
+    fn not_called<T>(&self, text: String) -> Result<T, PluginError> {
+        Err(PluginError::InvalidInput { plugin: self.plugin().info().name.clone(), text })
+    }
+}
+
 /// An instance of a matcher. For parallel work, make several.
 #[derive(Debug)]
-pub struct Matcher(Instance);
+pub struct Matcher(Body);
 
 impl Matcher {
     pub(super) fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
-        Instance::create(plugin, settings).map(Self)
+        Body::create(plugin, settings).map(Self)
     }
 
     /// Which plugin it is.
@@ -41,30 +73,39 @@ impl Matcher {
 
     /// Which of the two calls it takes; a plugin with both is a search.
     pub fn form(&self) -> MatcherForm {
-        if self.0.plugin().table().search.is_some() { MatcherForm::Search } else { MatcherForm::Score }
+        self.0.plugin().code().form()
     }
 
     /// Similarity of photo and view, 0–1; both have one size.
     pub fn score(&mut self, photo: &LabelImage, view: &ViewImages<'_>) -> Result<f64, PluginError> {
         if let Some(text) = lend::view_conflict((photo.width(), photo.height()), view) {
-            return Err(PluginError::InvalidInput { plugin: self.0.name(), text });
+            return self.0.not_called(text);
         }
-        let (photo, view) = (lend::image(photo), lend::view(view));
-        let mut score = f64::NAN;
-        self.0.call(
-            "score",
-            || false,
-            |table, instance, error| match table.score {
-                // SAFETY: a function of the plugin's own table; instance, image, view, score and error live until it
-                // returns, and `call` holds the instance alone.
-                Some(function) => unsafe {
-                    function(instance, &raw const photo, &raw const view, &raw mut score, error)
-                },
-                None => STATUS_UNSUPPORTED,
-            },
-        )?;
-        check::ratio("score", score).map_err(|violation| self.0.invalid("score", violation))?;
-        Ok(score)
+        match &mut self.0 {
+            // SAFETY: photo and view are borrowed for longer than the call.
+            Body::Here(instance) => unsafe { line::score(instance, &lend::image(photo), &lend::view(view)) },
+            Body::Apart(instance) => Ok(instance.scores(photo, 1, &mut |_, take| take(view))?[0]),
+        }
+    }
+
+    /// Similarity of photo and `count` views, in order. `view` hands view `index` to its second argument; a plugin in
+    /// another process scores one batch of them while the next is made.
+    pub fn score_each(
+        &mut self,
+        photo: &LabelImage,
+        count: usize,
+        view: &mut MakeView<'_>,
+    ) -> Result<Vec<f64>, PluginError> {
+        if let Body::Apart(instance) = &mut self.0 {
+            return instance.scores(photo, count, view);
+        }
+        let mut scores = Vec::with_capacity(count);
+        for index in 0..count {
+            let mut score = Ok(f64::NAN);
+            view(index, &mut |view| score = self.score(photo, view));
+            scores.push(score?);
+        }
+        Ok(scores)
     }
 
     /// The pose of `photo`.
@@ -72,10 +113,12 @@ impl Matcher {
         let (labels, camera) = (photo.labels, photo.camera);
         if (labels.width(), labels.height()) != (camera.width, camera.height) {
             let (w, h) = (labels.width(), labels.height());
-            let text = format!("photo is {w}×{h}, its camera {}×{}", camera.width, camera.height);
-            return Err(PluginError::InvalidInput { plugin: self.0.name(), text });
+            return self.0.not_called(format!("photo is {w}×{h}, its camera {}×{}", camera.width, camera.height));
         }
-        let rules = Rules { classes: services.classes(), width: camera.width, height: camera.height, regions: 0 };
+        let instance = match &mut self.0 {
+            Body::Here(instance) => instance,
+            Body::Apart(instance) => return instance.search(services, photo),
+        };
         let (camera, prior) = (lend::camera(camera), lend::prior(photo.prior));
         let photo = abi::Photo {
             labels: lend::image(labels),
@@ -83,29 +126,23 @@ impl Matcher {
             prior: &raw const prior,
             ..abi::Photo::new()
         };
-        let mut found = abi::Localization::new();
-        let collected = collect(&mut self.0, "search", services, rules, |table, instance, context, error| {
-            match table.search {
-                // SAFETY: as in `score`.
-                Some(function) => unsafe {
-                    function(instance, context.services, &raw const photo, context.results, &raw mut found, error)
-                },
-                None => STATUS_UNSUPPORTED,
-            }
-        })?;
-        let found = results::localization(&found, collected.heat);
-        check::localization(&found).map_err(|violation| self.0.invalid("search", violation))?;
-        Ok(found)
+        // SAFETY: what the photo points to lives in this function, or is borrowed for longer.
+        unsafe { line::search(instance, services, &photo) }
+    }
+
+    /// Ends the instance and says how that went; the next call makes it anew. A linked-in plugin is left as it is.
+    pub fn finish(&mut self) -> Result<(), PluginError> {
+        self.0.finish()
     }
 }
 
 /// An instance of a change detector.
 #[derive(Debug)]
-pub struct Detector(Instance);
+pub struct Detector(Body);
 
 impl Detector {
     pub(super) fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
-        Instance::create(plugin, settings).map(Self)
+        Body::create(plugin, settings).map(Self)
     }
 
     /// Which plugin it is.
@@ -119,29 +156,31 @@ impl Detector {
         services: &dyn Services,
         input: &ComparisonInput<'_>,
     ) -> Result<Vec<ChangeRegion>, PluginError> {
-        let lent = Lent::new(&self.0, input)?;
-        let comparison = lent.comparison(input);
-        let rules = rules(services, input, 0);
-        let collected = collect(&mut self.0, "detect", services, rules, |table, instance, context, error| {
-            match table.detect {
-                // SAFETY: as in `Matcher::score`.
-                Some(function) => unsafe {
-                    function(instance, context.services, &raw const comparison, context.results, error)
-                },
-                None => STATUS_UNSUPPORTED,
-            }
-        })?;
-        Ok(collected.regions)
+        if let Some(text) = lend::size_conflict(input) {
+            return self.0.not_called(text);
+        }
+        let instance = match &mut self.0 {
+            Body::Here(instance) => instance,
+            Body::Apart(instance) => return instance.detect(services, input),
+        };
+        let lent = Lent::new(input);
+        // SAFETY: what the comparison points to lives in this function, or is borrowed for longer.
+        unsafe { line::detect(instance, services, &lent.comparison(input)) }
+    }
+
+    /// As [`Matcher::finish`].
+    pub fn finish(&mut self) -> Result<(), PluginError> {
+        self.0.finish()
     }
 }
 
 /// An instance of a descriptor estimator.
 #[derive(Debug)]
-pub struct Estimator(Instance);
+pub struct Estimator(Body);
 
 impl Estimator {
     pub(super) fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
-        Instance::create(plugin, settings).map(Self)
+        Body::create(plugin, settings).map(Self)
     }
 
     /// Which plugin it is.
@@ -156,29 +195,22 @@ impl Estimator {
         input: &ComparisonInput<'_>,
         regions: &[ChangeRegion],
     ) -> Result<Vec<Proposal>, PluginError> {
-        let lent = Lent::new(&self.0, input)?;
-        let comparison = lent.comparison(input);
+        if let Some(text) = lend::size_conflict(input) {
+            return self.0.not_called(text);
+        }
+        let instance = match &mut self.0 {
+            Body::Here(instance) => instance,
+            Body::Apart(instance) => return instance.estimate(services, input, regions),
+        };
+        let lent = Lent::new(input);
         let records: Vec<_> = regions.iter().map(lend::region).collect();
-        let rules = rules(services, input, regions.len());
-        let collected = collect(&mut self.0, "estimate", services, rules, |table, instance, context, error| {
-            match table.estimate {
-                // SAFETY: as in `Matcher::score`; the regions and their masks live until it returns.
-                Some(function) => unsafe {
-                    function(
-                        instance,
-                        context.services,
-                        &raw const comparison,
-                        records.as_ptr(),
-                        records.len(),
-                        size_of::<abi::Region>(),
-                        context.results,
-                        error,
-                    )
-                },
-                None => STATUS_UNSUPPORTED,
-            }
-        })?;
-        Ok(collected.proposals)
+        // SAFETY: what comparison and records point to lives in this function, or is borrowed for longer.
+        unsafe { line::estimate(instance, services, &lent.comparison(input), &records) }
+    }
+
+    /// As [`Matcher::finish`].
+    pub fn finish(&mut self) -> Result<(), PluginError> {
+        self.0.finish()
     }
 }
 
@@ -190,15 +222,12 @@ struct Lent {
 }
 
 impl Lent {
-    fn new(instance: &Instance, input: &ComparisonInput<'_>) -> Result<Self, PluginError> {
-        if let Some(text) = lend::size_conflict(input) {
-            return Err(PluginError::InvalidInput { plugin: instance.name(), text });
-        }
-        Ok(Self {
+    fn new(input: &ComparisonInput<'_>) -> Self {
+        Self {
             view: lend::view(&input.view),
             camera: lend::camera(input.camera),
             estimate: lend::estimate(input.estimate),
-        })
+        }
     }
 
     fn comparison(&self, input: &ComparisonInput<'_>) -> abi::Comparison {
@@ -210,34 +239,4 @@ impl Lent {
             ..abi::Comparison::new()
         }
     }
-}
-
-fn rules<'a>(services: &'a dyn Services, input: &ComparisonInput<'_>, regions: usize) -> Rules<'a> {
-    Rules { classes: services.classes(), width: input.photo.width(), height: input.photo.height(), regions }
-}
-
-/// What the host lends to a call beside its input.
-struct Context {
-    services: *const abi::Services,
-    results: *const abi::Results,
-}
-
-/// Runs a call that delivers results; a violation comes before whatever the plugin itself says.
-fn collect(
-    instance: &mut Instance,
-    call: &'static str,
-    services: &dyn Services,
-    rules: Rules<'_>,
-    body: impl FnOnce(&abi::Table, *mut abi::Instance, &Context, *mut abi::ErrorText) -> Status,
-) -> Result<Collected, PluginError> {
-    let (collector, table) = (Collector::new(rules), ServiceTable::new(services));
-    let (results, service_table) = (collector.results(), table.table());
-    let context = Context { services: &raw const service_table, results: &raw const results };
-    let outcome =
-        instance.call(call, || services.cancelled(), |table, pointer, error| body(table, pointer, &context, error));
-    let mut collected = collector.finish();
-    if let Some(violation) = collected.violation.take() {
-        return Err(instance.invalid(call, violation));
-    }
-    outcome.map(|()| collected)
 }

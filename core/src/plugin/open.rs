@@ -5,8 +5,10 @@ use super::declaration::{Declared, Fault, header_bytes, read_builtin};
 use super::error::{PluginError, Refusal, Stage};
 use super::info::{Digest, Kind, PluginInfo};
 use super::instance::ErrorBuffer;
-use super::kinds::{Detector, Estimator, Matcher};
+use super::isolation::Isolation;
+use super::kinds::{Detector, Estimator, Matcher, MatcherForm};
 use super::lend;
+use super::process::{Fingerprint, Program};
 use super::settings::{Settings, SettingsSchema};
 use resurvey_schema::abi::{self, ABI_MAJOR, ABI_MINOR, Declaration, Growing, HEADER_BYTES, STATUS_OK, Table};
 use std::path::Path;
@@ -19,11 +21,31 @@ pub struct Plugin(Arc<Loaded>);
 #[derive(Debug)]
 struct Loaded {
     info: PluginInfo,
-    table: Table,
+    code: Code,
     schema: SettingsSchema,
 }
 
-// SAFETY: the pointers in `table` are functions and a text that live as long as the process (a library is never closed);
+/// Where the functions of a plugin are.
+#[derive(Clone, Debug)]
+pub(super) enum Code {
+    /// In this process.
+    Here(Table),
+    /// In processes of their own.
+    Apart(Arc<Program>),
+}
+
+impl Code {
+    /// Which call a matcher takes.
+    pub(super) fn form(&self) -> MatcherForm {
+        match self {
+            Self::Here(table) if table.search.is_some() => MatcherForm::Search,
+            Self::Here(_) => MatcherForm::Score,
+            Self::Apart(program) => program.form(),
+        }
+    }
+}
+
+// SAFETY: the pointers in a table are functions and a text that live as long as the process (a library is never closed);
 // the header asks of a plugin that `create` may be called from any thread, and the rest takes an instance.
 unsafe impl Send for Loaded {}
 // SAFETY: as above; nothing in it is ever written.
@@ -40,21 +62,33 @@ impl Plugin {
             enter(declaration, declared.kind).map_err(|fault| refused(&declared.name, fault))?;
         let parts = [&declared.name, &declared.version, &declared.summary, &schema_text];
         let sha256 = Digest::of(parts.map(|part| format!("{}\n{part}\n", part.len())).concat().as_bytes());
-        Ok(Self::new(declared, sha256, None, table, schema_text, schema))
+        Ok(Self::new(declared, sha256, None, Code::Here(table), schema_text, schema))
     }
 
     /// Opens the library at `path`, which the caller has hashed, checked and read `declared` from.
     pub(super) fn open(path: &Path, declared: Declared, sha256: Digest) -> Result<Self, Fault> {
         let declaration = open_library(path, &declared)?;
         let (table, schema_text, schema) = enter(declaration, declared.kind)?;
-        Ok(Self::new(declared, sha256, Some(path), table, schema_text, schema))
+        Ok(Self::new(declared, sha256, Some(path), Code::Here(table), schema_text, schema))
+    }
+
+    /// Starts the file at `path`, which the caller has hashed, checked and read `declared` from, in its own process.
+    pub(super) fn apart(
+        (path, fingerprint): (&Path, Fingerprint),
+        declared: Declared,
+        sha256: Digest,
+        isolation: Arc<Isolation>,
+    ) -> Result<Self, PluginError> {
+        let (program, schema) = Program::load((path, fingerprint), declared.clone(), sha256, isolation)?;
+        let text = program.settings_schema().to_owned();
+        Ok(Self::new(declared, sha256, Some(path), Code::Apart(Arc::new(program)), text, schema))
     }
 
     fn new(
         declared: Declared,
         sha256: Digest,
         path: Option<&Path>,
-        table: Table,
+        code: Code,
         schema_text: String,
         schema: SettingsSchema,
     ) -> Self {
@@ -66,9 +100,10 @@ impl Plugin {
             sha256,
             path: path.map(Path::to_owned),
             builtin: path.is_none(),
+            is_apart: matches!(code, Code::Apart(_)),
             settings_schema: Some(schema_text),
         };
-        Self(Arc::new(Loaded { info, table, schema }))
+        Self(Arc::new(Loaded { info, code, schema }))
     }
 
     /// What is known of it.
@@ -102,8 +137,8 @@ impl Plugin {
         Estimator::create(self.of_kind(Kind::Estimator)?, settings)
     }
 
-    pub(super) fn table(&self) -> &Table {
-        &self.0.table
+    pub(super) fn code(&self) -> &Code {
+        &self.0.code
     }
 
     fn of_kind(&self, wanted: Kind) -> Result<Self, PluginError> {

@@ -2,12 +2,20 @@
 
 use super::declaration::{Declared, Fault, read_library};
 use super::error::{PluginError, Refusal, Stage};
+use super::executable::{is_named_executable, read_executable};
 use super::info::{Digest, PluginInfo};
+use super::isolation::Isolation;
 use super::open::Plugin;
+use super::process::Fingerprint;
 use super::trust;
 use resurvey_schema::abi::Declaration;
+use resurvey_schema::wire::DECLARATION;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What to do about a file that cannot be read.
+const UNREADABLE: &str = "check path and permissions";
 
 /// The plugins that can be had by name.
 #[derive(Debug, Default)]
@@ -17,6 +25,7 @@ pub struct Registry {
     skipped: Vec<SkippedFile>,
     directories: Vec<PathBuf>,
     allowed: HashSet<Digest>,
+    isolation: Option<Arc<Isolation>>,
 }
 
 /// A file that will not be loaded.
@@ -34,6 +43,11 @@ impl Registry {
     /// No plugins yet; library files load when their SHA-256 is in `allowed`.
     pub fn new(allowed: impl IntoIterator<Item = Digest>) -> Self {
         Self { allowed: allowed.into_iter().collect(), ..Self::default() }
+    }
+
+    /// Runs plugins from files in processes of their own. Without it libraries are opened in this process.
+    pub fn isolate(&mut self, isolation: Isolation) {
+        self.isolation = Some(Arc::new(isolation));
     }
 
     /// Adds a plugin that is linked into this program.
@@ -55,7 +69,7 @@ impl Registry {
         self.directories.push(directory.to_owned());
         let entries = std::fs::read_dir(directory).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let mut paths: Vec<_> = match entries {
-            Ok(entries) => entries.into_iter().map(|entry| entry.path()).filter(|path| is_library(path)).collect(),
+            Ok(entries) => entries.into_iter().map(|entry| entry.path()).filter(|path| is_plugin(path)).collect(),
             Err(error) => {
                 let advice = "leave it out, or create it".to_owned();
                 self.skip(directory, None, (Stage::File, error.to_string(), advice));
@@ -74,7 +88,11 @@ impl Registry {
             Ok(candidate) => candidate,
             Err(fault) => return self.skip(path, name, fault),
         };
-        let info = candidate.info();
+        let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
+        let quarantine = self.isolation.as_ref().and_then(|isolation| isolation.crashes.as_ref());
+        if let Some(Err(fault)) = quarantine.map(|log| log.check(info.sha256, &info.name)) {
+            return self.skip(path, name, fault);
+        }
         let first = match (self.builtins.contains_key(&info.name), self.found.get(&info.name)) {
             (true, _) => "built in".to_owned(),
             (false, Some(first)) => {
@@ -129,7 +147,7 @@ impl Registry {
     /// What the library at `path` says of itself, whether or not it may be loaded; runs no code of it.
     pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
         let found = read(path).and_then(|(path, bytes)| {
-            let declared = read_library(&bytes)?;
+            let declared = read_declaration(&path, &bytes)?;
             Ok(Candidate { path, sha256: Digest::of(&bytes), declared }.info())
         });
         found.map_err(|fault| refusal(path, fault).into())
@@ -140,17 +158,23 @@ impl Registry {
         trust::check_permissions(path).map_err(|fault| refusal(path, fault).into())
     }
 
-    /// The plugin in the library at `path`, under the same rules.
+    /// The plugin in the file at `path`, under the same rules.
     pub fn load_file(&self, path: &Path) -> Result<Plugin, PluginError> {
-        let opened = examine(path, &self.allowed).1.and_then(|candidate| {
-            let Candidate { path, sha256, declared } = candidate;
-            Plugin::open(&path, declared, sha256)
-        });
-        opened.map_err(|fault| refusal(path, fault).into())
+        let refused = |fault| PluginError::from(refusal(path, fault));
+        let fingerprint = fingerprint(path).map_err(refused)?;
+        let Candidate { path: real, sha256, declared } = examine(path, &self.allowed).1.map_err(refused)?;
+        match &self.isolation {
+            Some(isolation) => Plugin::apart((&real, fingerprint), declared, sha256, Arc::clone(isolation)),
+            None if declared.is_executable() => {
+                let advice = "leave out --in-process".to_owned();
+                Err(refused((Stage::Symbol, "an executable runs in a process of its own alone".to_owned(), advice)))
+            }
+            None => Plugin::open(&real, declared, sha256).map_err(refused),
+        }
     }
 }
 
-/// A library that may be opened.
+/// A file that may be opened.
 struct Candidate {
     path: PathBuf,
     sha256: Digest,
@@ -161,7 +185,17 @@ impl Candidate {
     fn info(&self) -> PluginInfo {
         let Declared { kind, name, version, summary, .. } = self.declared.clone();
         let path = Some(self.path.clone());
-        PluginInfo { name, kind, version, summary, sha256: self.sha256, path, builtin: false, settings_schema: None }
+        PluginInfo {
+            name,
+            kind,
+            version,
+            summary,
+            sha256: self.sha256,
+            path,
+            builtin: false,
+            is_apart: false,
+            settings_schema: None,
+        }
     }
 }
 
@@ -171,18 +205,27 @@ fn examine(path: &Path, allowed: &HashSet<Digest>) -> (Option<String>, Result<Ca
         Ok(read) => read,
         Err(fault) => return (None, Err(fault)),
     };
-    let (sha256, declared) = (Digest::of(&bytes), read_library(&bytes));
+    let (sha256, declared) = (Digest::of(&bytes), read_declaration(&path, &bytes));
     let name = declared.as_ref().ok().map(|declared| declared.name.clone());
     let outcome = trust::check_permissions(&path)
         .and_then(|()| trust::check_allowed(&path, sha256, allowed))
         .and(declared)
+        .and_then(|declared| match declared.is_executable() {
+            true => trust::check_executable(&path).map(|()| declared),
+            false => Ok(declared),
+        })
         .map(|declared| Candidate { path, sha256, declared });
     (name, outcome)
 }
 
+/// What tells that the file is still the one that is read next.
+pub(super) fn fingerprint(path: &Path) -> Result<Fingerprint, Fault> {
+    Fingerprint::of(path).map_err(|error| (Stage::File, error.to_string(), UNREADABLE.to_owned()))
+}
+
 /// The real path and the bytes of a file.
 pub(super) fn read(path: &Path) -> Result<(PathBuf, Vec<u8>), Fault> {
-    let unreadable = |error: std::io::Error| (Stage::File, error.to_string(), "check path and permissions".to_owned());
+    let unreadable = |error: std::io::Error| (Stage::File, error.to_string(), UNREADABLE.to_owned());
     // The system looks along its own search path for a name without a directory: open the real path alone.
     let path = path.canonicalize().map_err(unreadable)?;
     if !path.metadata().map_err(unreadable)?.is_file() {
@@ -199,4 +242,21 @@ pub(super) fn refusal(path: &Path, (stage, reason, advice): Fault) -> Refusal {
 
 fn is_library(path: &Path) -> bool {
     path.extension().is_some_and(|suffix| suffix == "so" || suffix == "dylib" || suffix == "dll")
+}
+
+fn is_plugin(path: &Path) -> bool {
+    is_library(path) || is_named_executable(path)
+}
+
+/// What a file says of itself: a library by its symbol, any other file by its line.
+pub(super) fn read_declaration(path: &Path, bytes: &[u8]) -> Result<Declared, Fault> {
+    let line = if is_library(path) { None } else { read_executable(bytes) };
+    match line {
+        Some(declared) => declared,
+        None if is_named_executable(path) && !is_library(path) => {
+            let reason = format!("it has no line {DECLARATION:?}");
+            Err((Stage::Header, reason, "look at \"Executables\" in docs/plugin-wire.md".to_owned()))
+        }
+        None => read_library(bytes),
+    }
 }

@@ -12,7 +12,7 @@ use std::ffi::c_void;
 use std::sync::{Mutex, PoisonError};
 
 /// More results than this from one call are a bug of the plugin, not an answer.
-const MOST_RESULTS: usize = 1 << 20;
+pub(super) const MOST_RESULTS: usize = 1 << 20;
 
 /// Receives results of unknown length during one call.
 pub(super) struct Collector<'a> {

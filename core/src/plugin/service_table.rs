@@ -2,7 +2,9 @@
 #![allow(unsafe_code)]
 
 use super::lend::{self, read_growing, slice, slice_mut};
-use super::services::{ServiceError, Services, class_slots};
+use super::services::{
+    ServiceError, Services, class_slots, finite, finite_points, finite_poses, some_columns, some_stride,
+};
 use resurvey_schema::abi::{
     self, ErrorText, FeatureReceiver, Growing, STATUS_FAILED, STATUS_OK, Status, Task, Text, ViewReceiver,
 };
@@ -133,23 +135,6 @@ unsafe fn give<T: Copy>(pointer: *mut T, count: usize, values: impl ExactSizeIte
     Ok(())
 }
 
-fn finite_points(points: &[GridPoint]) -> Served {
-    if points.iter().all(GridPoint::is_finite) { Ok(()) } else { wrong("a position is not finite") }
-}
-
-fn finite_poses(poses: &[Pose]) -> Served {
-    let finite = |pose: &Pose| <[f64; 6]>::from(*pose).iter().all(|value| value.is_finite());
-    if poses.iter().all(finite) { Ok(()) } else { wrong("a pose is not finite") }
-}
-
-fn finite(values: &[f64]) -> Served {
-    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { wrong("a number is not finite") }
-}
-
-fn some_stride(stride: u32) -> Served {
-    if stride > 0 { Ok(()) } else { wrong("the stride is 0; expected at least 1") }
-}
-
 unsafe extern "C" fn render(
     context: *mut c_void,
     how: *const abi::RenderRequest,
@@ -220,9 +205,7 @@ unsafe extern "C" fn compare_panoramas(
             let (how, positions) = (request(how)?, many(positions, count)?);
             finite_points(positions)?;
             finite(&[how.first_yaw_rad, how.pitch_rad, how.roll_rad])?;
-            if how.columns == 0 {
-                return wrong("the panorama has 0 columns");
-            }
+            some_columns(how.columns)?;
             let request = PanoramaRequest {
                 pitch_rad: how.pitch_rad,
                 roll_rad: how.roll_rad,

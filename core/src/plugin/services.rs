@@ -90,3 +90,35 @@ pub trait Services: Sync {
 pub fn class_slots(classes: &ClassTable) -> usize {
     classes.iter().map(|class| usize::from(class.index.0) + 1).max().unwrap_or(0)
 }
+
+type Checked = Result<(), ServiceError>;
+
+fn wrong(what: &str) -> Checked {
+    Err(ServiceError(what.to_owned()))
+}
+
+/// What every service asks of the positions it is given.
+pub(super) fn finite_points(points: &[GridPoint]) -> Checked {
+    if points.iter().all(GridPoint::is_finite) { Ok(()) } else { wrong("a position is not finite") }
+}
+
+/// What every service asks of the poses it is given.
+pub(super) fn finite_poses(poses: &[Pose]) -> Checked {
+    let finite = |pose: &Pose| <[f64; 6]>::from(*pose).iter().all(|value| value.is_finite());
+    if poses.iter().all(finite) { Ok(()) } else { wrong("a pose is not finite") }
+}
+
+/// What every service asks of other numbers.
+pub(super) fn finite(values: &[f64]) -> Checked {
+    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { wrong("a number is not finite") }
+}
+
+/// A stride of nothing would never end.
+pub(super) fn some_stride(stride: u32) -> Checked {
+    if stride > 0 { Ok(()) } else { wrong("the stride is 0; expected at least 1") }
+}
+
+/// A panorama of nothing has no headings.
+pub(super) fn some_columns(columns: u32) -> Checked {
+    if columns > 0 { Ok(()) } else { wrong("the panorama has 0 columns") }
+}

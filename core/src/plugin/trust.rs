@@ -18,6 +18,24 @@ pub(super) fn check_permissions(path: &Path) -> Result<(), Fault> {
     }
 }
 
+/// Refuses a program that its owner may not execute.
+#[cfg(unix)]
+pub(super) fn check_executable(path: &Path) -> Result<(), Fault> {
+    use std::os::unix::fs::PermissionsExt;
+    let owner_executes = 0o100;
+    if std::fs::metadata(path).is_ok_and(|metadata| metadata.permissions().mode() & owner_executes != 0) {
+        return Ok(());
+    }
+    let advice = format!("run \"chmod u+x {}\"", path.display());
+    Err((Stage::Permissions, "it is a program that nobody may execute".to_owned(), advice))
+}
+
+/// Elsewhere no program is started.
+#[cfg(not(unix))]
+pub(super) fn check_executable(_: &Path) -> Result<(), Fault> {
+    Ok(())
+}
+
 /// Refuses a file whose digest is not allowed.
 pub(super) fn check_allowed(path: &Path, sha256: Digest, allowed: &HashSet<Digest>) -> Result<(), Fault> {
     if allowed.contains(&sha256) {

@@ -22,7 +22,7 @@ pub use request::{
 
 /// Version of the wire: the number in `hello`.
 pub const WIRE_VERSION: u32 = 1;
-/// Longest line in bytes, with its end.
+/// Longest line of a plugin in bytes, with its end.
 pub const LONGEST_LINE: usize = 1 << 20;
 /// What the declaration in an executable plugin begins with; a JSON object follows on the same line.
 pub const DECLARATION: &str = "resurvey-plugin: ";

@@ -81,5 +81,5 @@ impl Drop for Asked<'_> {
 
 /// Whether a plugin is a matcher in `score` form.
 pub(super) fn is_scorer(plugin: &Plugin) -> bool {
-    plugin.info().kind == Kind::Matcher && plugin.table().search.is_none()
+    plugin.info().kind == Kind::Matcher && plugin.code().form() == MatcherForm::Score
 }

@@ -1,8 +1,9 @@
 //! Which symbols a library offers to others: its declaration and nothing else.
 
 use super::super::error::PluginError;
-use super::super::registry::Registry;
+use super::super::registry;
 use super::finding::Finding;
+use super::raw::apart;
 use object::{Object, ObjectSymbol};
 use resurvey_schema::abi::SYMBOL_FAMILY;
 use std::path::Path;
@@ -16,8 +17,10 @@ const LISTED: usize = 5;
 /// Whether the declaration is the only symbol that `path` exports. Weak symbols (templates of C++) do not count: they
 /// cannot clash.
 pub(super) fn only_the_declaration(path: &Path, bytes: &[u8]) -> Finding {
-    if let Err(error) = Registry::inspect(path) {
-        return error.into();
+    match registry::read_declaration(path, bytes) {
+        Err(fault) => return PluginError::from(registry::refusal(path, fault)).into(),
+        Ok(declared) if declared.is_executable() => return apart(),
+        Ok(_) => {}
     }
     let file = match object::File::parse(bytes) {
         Ok(file) => file,

@@ -4,7 +4,7 @@
 use super::super::check::{self, Rules};
 use super::super::info::Kind;
 use super::super::lend::read_growing;
-use super::super::open::Plugin;
+use super::super::open::{Code, Plugin};
 use super::super::results::{self, Collector};
 use super::super::service_table::ServiceTable;
 use super::super::services::Services;
@@ -90,8 +90,11 @@ impl ErrorPlace {
 
 impl<'a> Raw<'a> {
     /// The table as the host filled it in when it opened the plugin.
-    pub(super) fn new(plugin: &'a Plugin, report: &'a Report) -> Self {
-        Self { plugin, table: *plugin.table(), report }
+    pub(super) fn new(plugin: &'a Plugin, report: &'a Report) -> Result<Self, Finding> {
+        match plugin.code() {
+            Code::Here(table) => Ok(Self { plugin, table: *table, report }),
+            Code::Apart(_) => Err(apart()),
+        }
     }
 
     /// The table that `declaration` fills for an older or newer host.
@@ -161,6 +164,11 @@ impl<'a> Raw<'a> {
         address.copy_from_slice(&bytes);
         Ok(RawInstance { raw: self, pointer: std::ptr::with_exposed_provenance_mut(usize::from_ne_bytes(address)) })
     }
+}
+
+/// What an executable does to the memory of its own process is nobody's business.
+pub(super) fn apart() -> Finding {
+    Finding::NotApplicable("an executable has no part in this process".to_owned())
 }
 
 fn no_function(name: &str) -> Finding {

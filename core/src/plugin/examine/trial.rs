@@ -1,6 +1,7 @@
 //! The trials by name, in the order in which they are made.
 
 use super::super::error::PluginError;
+use super::super::isolation::Isolation;
 use super::super::registry::{self, Registry};
 use super::super::trust;
 use super::exports::only_the_declaration;
@@ -10,6 +11,9 @@ use super::stage::Stage;
 use super::tries::{self, Bench, Tried};
 use super::{limits, sense};
 use std::path::Path;
+use std::sync::Arc;
+
+const BYTES_PER_MIB: u64 = 1 << 20;
 
 /// A promise of the plugin line that is put to the test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,21 +122,21 @@ impl Trial {
     }
 }
 
-/// Puts the library at `path` to `trial` in this process, which gets at most `memory_bytes` of address space, may not
-/// survive it and does nothing else afterwards; what happens is written into `report`.
-pub fn examine(trial: Trial, path: &Path, stage: &dyn Stage, memory_bytes: u64, report: &Report) {
-    limits::set(memory_bytes);
+/// Puts the library at `path` to `trial` in this process, which gets no more address space than `isolation` gives to a
+/// plugin, may not survive it and does nothing else afterwards; what happens is written into `report`.
+pub fn examine(trial: Trial, path: &Path, stage: &dyn Stage, isolation: Isolation, report: &Report) {
+    limits::set(isolation.memory_mib.saturating_mul(BYTES_PER_MIB));
     #[cfg(unix)]
     super::fault::tell(report.file());
     report.step("before the first call");
-    let finding = attempt(trial, path, stage, report).unwrap_or_else(|finding| finding);
+    let finding = attempt(trial, path, stage, isolation, report).unwrap_or_else(|finding| finding);
     report.end(&finding);
 }
 
-fn attempt(trial: Trial, path: &Path, stage: &dyn Stage, report: &Report) -> Tried {
+fn attempt(trial: Trial, path: &Path, stage: &dyn Stage, isolation: Isolation, report: &Report) -> Tried {
     let refused = |fault| Finding::from(PluginError::from(registry::refusal(path, fault)));
     let (path, bytes) = registry::read(path).map_err(refused)?;
-    let bench = Bench { path: &path, bytes: &bytes, stage, report };
+    let bench = Bench { path: &path, bytes: &bytes, stage, report, isolation: Arc::new(isolation) };
     match trial {
         Trial::Header => {
             let info = Registry::inspect(&path)?;

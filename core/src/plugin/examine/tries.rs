@@ -2,7 +2,8 @@
 
 use super::super::error::PluginError;
 use super::super::info::{Digest, Kind};
-use super::super::open::{Plugin, open_library};
+use super::super::isolation::Isolation;
+use super::super::open::{Code, Plugin, open_library};
 use super::super::settings::ValueType;
 use super::super::{declaration, registry};
 use super::answer::Answer;
@@ -11,12 +12,13 @@ use super::exhibit::Exhibit;
 use super::finding::Finding;
 use super::lent::{Host, Layout};
 use super::manners::Manners;
-use super::raw::Raw;
+use super::raw::{Raw, apart};
 use super::report::Report;
 use super::stage::{Place, Side, Stage};
 use super::watched::Watched;
 use resurvey_schema::GridPoint;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What a trial works with.
@@ -25,6 +27,8 @@ pub(super) struct Bench<'a> {
     pub bytes: &'a [u8],
     pub stage: &'a dyn Stage,
     pub report: &'a Report,
+    /// How an executable is started.
+    pub isolation: Arc<Isolation>,
 }
 
 /// A trial ends with what it found, early or late.
@@ -55,9 +59,15 @@ fn courtyard<'a>(side: Side<'a>, centre: GridPoint) -> Watched<'a> {
 impl Bench<'_> {
     pub(super) fn open(&self) -> Result<Plugin, Finding> {
         let refused = |fault| Finding::from(PluginError::from(registry::refusal(self.path, fault)));
-        let declared = declaration::read_library(self.bytes).map_err(refused)?;
+        let declared = registry::read_declaration(self.path, self.bytes).map_err(refused)?;
+        let sha256 = Digest::of(self.bytes);
+        if declared.is_executable() {
+            self.report.step("at its start");
+            let place = (self.path, registry::fingerprint(self.path).map_err(refused)?);
+            return Ok(Plugin::apart(place, declared, sha256, Arc::clone(&self.isolation))?);
+        }
         self.report.step("in the library's own start or in entry");
-        let plugin = Plugin::open(self.path, declared, Digest::of(self.bytes)).map_err(refused)?;
+        let plugin = Plugin::open(self.path, declared, sha256).map_err(refused)?;
         self.report.step("after entry");
         Ok(plugin)
     }
@@ -175,7 +185,7 @@ pub(super) fn small_images(bench: &Bench<'_>) -> Tried {
 /// Rows may be padded.
 pub(super) fn rows(bench: &Bench<'_>) -> Tried {
     let plugin = bench.open()?;
-    let raw = Raw::new(&plugin, bench.report);
+    let raw = Raw::new(&plugin, bench.report)?;
     bench.at(SMALL, |place| {
         let exhibit = Exhibit::new(place, side(plugin.info().kind, place))?;
         let answer = |padding| raw.create()?.call(&exhibit, exhibit.services, Layout { padding, ..Layout::default() });
@@ -228,7 +238,7 @@ pub(super) fn nothing(bench: &Bench<'_>) -> Tried {
 /// What is lent is read, not written, and not used after the call.
 pub(super) fn inputs(bench: &Bench<'_>) -> Tried {
     let plugin = bench.open()?;
-    let raw = Raw::new(&plugin, bench.report);
+    let raw = Raw::new(&plugin, bench.report)?;
     bench.at(SMALL, |place| {
         let exhibit = Exhibit::new(place, side(plugin.info().kind, place))?;
         let mut instance = raw.create()?;
@@ -247,7 +257,7 @@ pub(super) fn inputs(bench: &Bench<'_>) -> Tried {
 /// Nothing is written beside the places for answers and errors; a call may come without a place for its error.
 pub(super) fn outputs(bench: &Bench<'_>) -> Tried {
     let plugin = bench.open()?;
-    let raw = Raw::new(&plugin, bench.report);
+    let raw = Raw::new(&plugin, bench.report)?;
     for size in [SMALL, [1, 1]] {
         bench.at(size, |place| {
             let mut instance = raw.create()?;
@@ -377,10 +387,10 @@ pub(super) fn newer_host(bench: &Bench<'_>) -> Tried {
 
 fn with_host(bench: &Bench<'_>, host: Host, judge: impl Fn(&Answer, &Answer) -> Tried) -> Tried {
     let plugin = bench.open()?;
+    let today = Raw::new(&plugin, bench.report)?;
     let refused = |fault| Finding::from(PluginError::from(registry::refusal(bench.path, fault)));
     let declared = declaration::read_library(bench.bytes).map_err(refused)?;
     let opened = open_library(bench.path, &declared).map_err(refused)?;
-    let today = Raw::new(&plugin, bench.report);
     let other = Raw::enter(&plugin, opened, host, bench.report)?;
     bench.at(SMALL, |place| {
         let exhibit = Exhibit::new(place, side(plugin.info().kind, place))?;
@@ -396,6 +406,9 @@ pub(super) fn manners(bench: &Bench<'_>) -> Tried {
     let before = Manners::now();
     let compare = |when: &str| before.change(&Manners::now(), when).map_or(Ok(()), Err);
     let plugin = bench.open()?;
+    if matches!(plugin.code(), Code::Apart(_)) {
+        return Err(apart());
+    }
     compare("when the library was opened")?;
     bench.at(SMALL, |place| {
         let exhibit = Exhibit::new(place, side(plugin.info().kind, place))?;

@@ -39,6 +39,12 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Settings that the host has completed and checked.
+    #[cfg(target_os = "linux")]
+    pub(in super::super) fn completed(json: String) -> Self {
+        Self { json }
+    }
+
     /// A JSON object with every setting, sorted by name, each number in one form.
     pub fn as_json(&self) -> &str {
         &self.json

@@ -1,0 +1,114 @@
+//! What the host lends in one call: arrays one after the other in the shared memory.
+
+use super::memory::{Plain, SharedMemory, aligned};
+use crate::image::Raster;
+use crate::plugin::input::ViewImages;
+use resurvey_schema::service::ViewFeature;
+use resurvey_schema::wire::{Array, Dtype, MEMORY_HEADER, Scratch, WireViews};
+use std::io;
+
+/// Least bytes that a plugin may write to in a call.
+const SCRATCH_BYTES: usize = 1 << 20;
+
+/// The host's side of the memory.
+#[derive(Debug)]
+pub(super) struct Lending {
+    pub(super) memory: SharedMemory,
+    /// The first byte that is not lent.
+    next: usize,
+}
+
+impl Lending {
+    pub(super) fn new() -> io::Result<Self> {
+        Ok(Self { memory: SharedMemory::new()?, next: MEMORY_HEADER })
+    }
+
+    /// Takes everything back.
+    pub(super) fn start(&mut self) {
+        self.next = MEMORY_HEADER;
+        self.memory.set_cancelled(false);
+    }
+
+    /// Where the next array will lie.
+    pub(super) fn mark(&self) -> usize {
+        self.next
+    }
+
+    /// Takes back what was lent since `mark`.
+    pub(super) fn back_to(&mut self, mark: usize) {
+        self.next = mark;
+    }
+
+    /// A place for an array.
+    pub(super) fn reserve(&mut self, dtype: Dtype, shape: &[usize]) -> io::Result<Array> {
+        let offset = aligned(self.next);
+        let end = Array::packed_bytes(dtype, shape).and_then(|bytes| offset.checked_add(bytes));
+        let end = end.ok_or_else(|| io::Error::other("an array is larger than memory can be"))?;
+        self.memory.grow(end)?;
+        self.next = end;
+        Ok(Array::packed(dtype, shape, offset))
+    }
+
+    /// A copy of `values`, which are the rows of `shape`.
+    pub(super) fn lend<T: Plain>(&mut self, shape: &[usize], values: &[T]) -> io::Result<Array> {
+        let array = self.reserve(T::DTYPE, shape)?;
+        self.memory.write(array.offset, values);
+        Ok(array)
+    }
+
+    /// A copy of a raster.
+    pub(super) fn raster<T: Plain>(&mut self, raster: &Raster<T>) -> io::Result<Array> {
+        self.lend(&[raster.height() as usize, raster.width() as usize], raster.values())
+    }
+
+    /// A place for what the plugin sends, with at least a byte per pixel.
+    pub(super) fn scratch(&mut self, pixels: usize) -> io::Result<Scratch> {
+        let bytes = SCRATCH_BYTES.max(aligned(pixels));
+        let array = self.reserve(Dtype::U8, &[bytes])?;
+        Ok(Scratch { offset: array.offset, bytes })
+    }
+
+    /// Places for `count` views of one size, with the table that their features index.
+    pub(super) fn reserve_views(
+        &mut self,
+        count: usize,
+        (width, height): (u32, u32),
+        table: &[ViewFeature],
+    ) -> io::Result<WireViews> {
+        let (width, height) = (width as usize, height as usize);
+        Ok(WireViews {
+            origins: self.reserve(Dtype::F64, &[count, 3])?,
+            labels: self.reserve(Dtype::U8, &[count, height, width])?,
+            range_m: self.reserve(Dtype::F32, &[count, height, width])?,
+            points: self.reserve(Dtype::F32, &[count, height, width, 3])?,
+            features: self.reserve(Dtype::U32, &[count, height, width])?,
+            feature_table: self.lend(&[table.len()], table)?,
+        })
+    }
+
+    /// Copies a view to place `index` of `views`, which are of its size.
+    pub(super) fn put_view(&self, views: &WireViews, index: usize, view: &ViewImages<'_>) {
+        let at = |array: &Array| array.offset + index * array.strides[0];
+        self.memory.write(at(&views.origins), &<[f64; 3]>::from(view.origin));
+        self.memory.write(at(&views.labels), view.labels.values());
+        self.memory.write(at(&views.range_m), view.range_m.values());
+        self.memory.write(at(&views.points), view.points.values());
+        self.memory.write(at(&views.features), view.features.values());
+    }
+}
+
+/// The first `count` views of `views`.
+pub(super) fn first(views: &WireViews, count: usize) -> WireViews {
+    let mut views = views.clone();
+    for array in [&mut views.origins, &mut views.labels, &mut views.range_m, &mut views.points, &mut views.features] {
+        array.shape[0] = count;
+    }
+    views
+}
+
+/// Bytes of one view of this size.
+pub(super) fn view_bytes((width, height): (u32, u32)) -> usize {
+    // Label, range, point and feature of a pixel.
+    const PIXEL_BYTES: usize = 1 + 4 + 12 + 4;
+    (width as usize * height as usize).saturating_mul(PIXEL_BYTES).max(1)
+}
