@@ -1,18 +1,18 @@
 //! Rates of the store: `cargo bench -p resurvey-core --bench store`, with numbers of features for those sizes alone
-//! (`-- 200000`), or `-- --full` for 1 and 10 million (long, and 8 GB of disk).
+//! (`-- 200000`), or `-- --full` for 1 and 10 million (ten minutes, and 4 GB of disk).
 //!
 //! Medians of 101 warm runs by the clock, and means on a processor, which count where others use the machine too. The
 //! temporary directory should be on the disk that is to be measured.
 
 #[path = "store/banners.rs"]
 mod banners;
-#[path = "store/plain.rs"]
-mod plain;
+#[path = "store/designs.rs"]
+mod designs;
 #[path = "store/writers.rs"]
 mod writers;
 
 use banners::{Random, new_map, now, side_m, square, transaction};
-use plain::Plain;
+use designs::{Copy, Design};
 use resurvey_core::store::{History, MapFile};
 use resurvey_core::version::{BoxMm, Delta, Feature, FeatureState, Fid, VersionId};
 use std::collections::BTreeSet;
@@ -25,6 +25,8 @@ use std::time::Instant;
 const RUNS: usize = 101;
 /// The obvious design takes a hundred times as long.
 const OBVIOUS_RUNS: usize = 7;
+/// Of more features the copies in other designs would take too much of a disk.
+const COMPARED: usize = 2_000_000;
 /// A transaction holds its features in memory.
 const LOADED_AT_ONCE: usize = 500_000;
 const HOT_VERSIONS: u64 = 10_000;
@@ -87,13 +89,30 @@ fn measure(directory: &Path, features: usize) {
     }
     let (time, rows) = median(RUNS, || bench.map.changes(first, bench.head, Some(&elsewhere)).expect("changes").len());
     println!("    difference of 100 m elsewhere: {time} for {rows} deltas");
-    // Last: the bundled SQLite shares one page cache among the connections of a process.
-    let plain = Plain::copy_of(bench.map.path(), &directory.join(format!("{features}-plain.db")));
-    for (version, (time, rows)) in versions.into_iter().zip(here) {
-        let (obvious, expected) = median(OBVIOUS_RUNS, || plain.features_in(&hot, version));
-        assert_eq!(rows, expected, "both designs find the same");
-        let ratio = obvious.cpu_s / time.cpu_s;
-        println!("    3-D R*Tree with version filter at version {}: {obvious}, {ratio:.0} times as long", version.0);
+    if features > COMPARED {
+        return;
+    }
+    compare(&bench, directory, &versions.into_iter().zip(here).collect::<Vec<_>>(), &hot);
+}
+
+/// Asks other designs the same. Last: the bundled SQLite shares one page cache among the connections of a process.
+fn compare(bench: &Bench, directory: &Path, here: &[(VersionId, (Times, usize))], region: &BoxMm) {
+    let path = bench.map.path();
+    for (name, design, runs) in [
+        ("3-D R*Tree with version filter", Design::VersionFilter, OBVIOUS_RUNS),
+        ("4-D R*Tree, a version as 1 mm", Design::FourthAxis { version_mm: 1 }, RUNS),
+        ("4-D R*Tree, a version as 256 mm", Design::FourthAxis { version_mm: 256 }, RUNS),
+    ] {
+        let file = directory.join("other-design.db");
+        let copy = Copy::of(path, &file, design);
+        for (version, (time, rows)) in here {
+            let (other, found) = median(runs, || copy.features_in(region, *version));
+            assert_eq!(*rows, found, "all designs find the same");
+            let ratio = other.cpu_s / time.cpu_s;
+            println!("    {name} at version {}: {other}, {ratio:.1} times as long", version.0);
+        }
+        drop(copy);
+        std::fs::remove_file(&file).expect("the copy is removed");
     }
 }
 

@@ -4,4 +4,11 @@
 pub const APPLICATION_ID: i32 = 0x5253_5659;
 
 /// Migrations in order; a file with `user_version` n has had the first n of them.
-pub const MIGRATIONS: &[&str] = &[include_str!("../sql/0001_map.sql"), include_str!("../sql/0002_history.sql")];
+pub const MIGRATIONS: &[&str] = &[
+    include_str!("../sql/0001_map.sql"),
+    include_str!("../sql/0002_history.sql"),
+    include_str!("../sql/0003_index.sql"),
+];
+
+/// The index of the newest format for one connection to an older map.
+pub const INDEX_BESIDE: &str = include_str!("../sql/index_beside.sql");

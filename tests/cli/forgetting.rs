@@ -107,7 +107,7 @@ fn fixture(name: &str) -> PathBuf {
 
 #[test]
 fn a_map_of_every_format_so_far_opens_unchanged_and_takes_another_version() {
-    for (name, format) in [("map-format-1.rsv", 1), ("map-format-2.rsv", 2)] {
+    for (name, format) in [("map-format-1.rsv", 1), ("map-format-2.rsv", 2), ("map-format-3.rsv", 3)] {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join(name);
         std::fs::copy(fixture(name), &path).unwrap();
@@ -130,7 +130,7 @@ fn a_map_of_every_format_so_far_opens_unchanged_and_takes_another_version() {
         json(&["proposals", map]);
         assert_eq!((std::fs::read(&path).unwrap() == bytes, format_of()), (true, format), "{name}");
         json(&["proposals", map, "accept", "1"]);
-        assert_eq!((json(&["query", map])["version"].as_u64(), format_of()), (Some(head + 1), 2), "{name}");
+        assert_eq!((json(&["query", map])["version"].as_u64(), format_of()), (Some(head + 1), 3), "{name}");
         assert_eq!(json(&["fsck", map]), json!({"ok": true, "problems": []}));
         let log: Value = json(&["log", map]);
         assert_eq!(log["versions"].as_array().unwrap().len() as u64, head + 2);

@@ -5,13 +5,14 @@ use super::commit_error::CommitError;
 use super::differences::{changes, changes_in};
 use super::error::StoreError;
 use super::forgotten::check_state;
+use super::index;
 use super::interface::History;
 use super::logs::{all_records, record, records_in};
 use super::map_file::MapFile;
 use super::observed::features_observed;
 use super::revisions::{tag, tags, untag, version_at};
 use super::rows::{classes_at, head};
-use super::states::{all_features, bounds, feature_at, features_in, geometry, lives};
+use super::states::{all_features, feature_at, geometry, lives};
 use crate::version::{BoxMm, Delta, Digest, Feature, Fid, UpdateTransaction, VersionId, VersionRecord};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
@@ -51,7 +52,7 @@ impl History for MapFile {
         self.read(|connection| {
             check_state(connection, version)?;
             match region {
-                Some(region) => features_in(connection, version, region),
+                Some(region) => index::state(connection, version, region),
                 None => all_features(connection, version),
             }
         })
@@ -81,7 +82,7 @@ impl History for MapFile {
     fn bounds(&self, version: VersionId) -> Result<Option<BoxMm>, StoreError> {
         self.read(|connection| {
             check_state(connection, version)?;
-            bounds(connection, version)
+            index::bounds_of(connection, version)
         })
     }
 

@@ -3,13 +3,13 @@
 use super::commit_error::{CommitError, ConflictingChange};
 use super::error::Fault;
 use super::forgotten::check_state;
-use super::index::IndexOrigin;
+use super::index;
 use super::map_file::WriteFault;
 use super::plan::starts_from;
 use super::states::feature_at;
-use crate::version::{BoxMm, Delta, FeatureState, Fid, UpdateTransaction, VersionId};
+use crate::version::{Delta, FeatureState, Fid, UpdateTransaction, VersionId};
 use rusqlite::{Connection, named_params};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A row of `feature_version` that is live.
 pub(super) struct LiveRow {
@@ -47,7 +47,7 @@ pub(super) fn check_conflicts(
     if let Some(region) = &transaction.viewed_region {
         // Of what changed since a forgotten version not every trace is left.
         check_state(connection, transaction.base)?;
-        for fid in changed_since(connection, region, transaction.base)? {
+        for fid in index::changed_since(connection, region, transaction.base)? {
             changed.insert(fid, false);
         }
     }
@@ -66,29 +66,6 @@ pub(super) fn check_conflicts(
     };
     let changed = changed.into_iter().map(describe).collect::<Result<_, Fault>>()?;
     Err(WriteFault::Refused(CommitError::Conflict { base: transaction.base, head, changed, looked_at: Vec::new() }))
-}
-
-/// Features in `region` whose state began or ended after `base`.
-fn changed_since(connection: &Connection, region: &BoxMm, base: VersionId) -> Result<BTreeSet<Fid>, Fault> {
-    const BEGAN: &str = "SELECT f.fid FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
-            AND i.v0 > :base ORDER BY f.fid";
-    const ENDED: &str = "SELECT f.fid FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
-            AND i.v1 >= :base AND i.v1 < 2147483647 ORDER BY f.fid";
-    let mut changed = BTreeSet::new();
-    let Some(origin) = IndexOrigin::read(connection)? else { return Ok(changed) };
-    let Some([e0, e1, n0, n1, h0, h1]) = origin.clamp(region) else { return Ok(changed) };
-    for sql in [BEGAN, ENDED] {
-        let mut statement = connection.prepare_cached(sql)?;
-        let mut rows = statement.query(named_params! {
-            ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1, ":base": base.0 as i64,
-        })?;
-        while let Some(row) = rows.next()? {
-            changed.insert(Fid(row.get::<_, i64>(0)?.unsigned_abs()));
-        }
-    }
-    Ok(changed)
 }
 
 /// The last version that began or ended a state of `fid`.

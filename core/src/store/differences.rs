@@ -2,11 +2,11 @@
 
 use super::error::Fault;
 use super::forgotten::check_state;
-use super::index::IndexOrigin;
+use super::index;
 use super::rows::FEATURE_COLUMNS;
 use super::states::{feature_at, features};
 use crate::version::{BoxMm, Delta, Feature, FeatureState, Fid, VersionId};
-use rusqlite::{Connection, ToSql, named_params};
+use rusqlite::{Connection, named_params};
 use std::collections::BTreeMap;
 
 /// Both sides of a feature while they are being found.
@@ -35,32 +35,7 @@ pub(super) fn changes_in(
     to: VersionId,
     region: &BoxMm,
 ) -> Result<Vec<Delta>, Fault> {
-    const ADDED: &str = "AND i.v0 > :a AND i.v0 <= :b AND i.v1 >= :b ORDER BY f.fid";
-    const REMOVED: &str = "AND i.v0 <= :a AND i.v1 >= :a AND i.v1 < :b ORDER BY f.fid";
-    difference(connection, from, to, |early, late| {
-        let versions: [(&str, &dyn ToSql); 2] = [(":a", &(early.0 as i64)), (":b", &(late.0 as i64))];
-        let select = |condition| in_region(connection, region, condition, &versions);
-        Ok((select(REMOVED)?, select(ADDED)?))
-    })
-}
-
-/// The features in `region` that meet `condition` on the index `i` and the row `f`, over all versions.
-fn in_region(
-    connection: &Connection,
-    region: &BoxMm,
-    condition: &str,
-    parameters: &[(&str, &dyn ToSql)],
-) -> Result<Vec<Feature>, Fault> {
-    let Some(origin) = IndexOrigin::read(connection)? else { return Ok(Vec::new()) };
-    let Some(ends) = origin.clamp(region) else { return Ok(Vec::new()) };
-    let sql = format!(
-        "SELECT {FEATURE_COLUMNS} FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0 {condition}"
-    );
-    let names = [":e0", ":e1", ":n0", ":n1", ":h0", ":h1"];
-    let box_parameters = names.into_iter().zip(ends.iter().map(|end| end as &dyn ToSql));
-    let all: Vec<_> = box_parameters.chain(parameters.iter().copied()).collect();
-    features(connection, &sql, &all)
+    difference(connection, from, to, |early, late| index::difference(connection, [early, late], region))
 }
 
 /// Pairs what `select` finds to have gone and come between two versions into deltas from `from` to `to`.

@@ -3,7 +3,7 @@
 use super::commit_error::CommitError;
 use super::conflict::LiveRow;
 use super::error::Fault;
-use super::index::{IndexBox, IndexOrigin, LIVE, hilbert_key};
+use super::index::{IndexBox, IndexChanges, IndexOrigin, hilbert_key};
 use super::map_file::WriteFault;
 use super::plan::{Plan, check_digests, needed_geometry};
 use crate::version::{Delta, FeatureState, Fid, UpdateTransaction, VersionId};
@@ -45,8 +45,6 @@ pub(super) fn write_rows(
     plan: &Plan,
     live: &BTreeMap<Fid, LiveRow>,
 ) -> Result<(), WriteFault<CommitError>> {
-    let version = plan.record.version;
-    end_rows(connection, live, version)?;
     let Some(envelope) = &plan.record.envelope else { return Ok(()) };
     let origin = match IndexOrigin::read(connection)? {
         Some(origin) => origin,
@@ -56,6 +54,9 @@ pub(super) fn write_rows(
             origin
         }
     };
+    let version = plan.record.version;
+    let mut index = IndexChanges::of(version.0 as i64);
+    end_rows(connection, live, version, origin, &mut index)?;
     let mut rows: Vec<(u64, &Delta, IndexBox)> = Vec::with_capacity(plan.deltas.len());
     for (delta, bounds) in plan.deltas.iter().zip(&plan.boxes) {
         let Some(bounds) = bounds else { continue };
@@ -65,55 +66,56 @@ pub(super) fn write_rows(
         };
         rows.push((hilbert_key(&ends), delta, ends));
     }
-    rows.sort_by_key(|(key, delta, _)| (*key, delta.fid()));
-    let mut inserts = Inserts::prepare(connection, version)?;
+    rows.sort_unstable_by_key(|(key, delta, _)| (*key, delta.fid()));
+    let mut insert = Insert::prepare(connection, version)?;
     for (_, delta, ends) in rows {
         if let Some(after) = delta.after() {
-            inserts.insert(delta.fid(), after, &ends)?;
+            index.begin(insert.row(delta.fid(), after)?, ends);
         }
     }
-    Ok(())
+    Ok(index.write(connection)?)
 }
 
-fn end_rows(connection: &Connection, live: &BTreeMap<Fid, LiveRow>, version: VersionId) -> Result<(), Fault> {
+fn end_rows(
+    connection: &Connection,
+    live: &BTreeMap<Fid, LiveRow>,
+    version: VersionId,
+    origin: IndexOrigin,
+    index: &mut IndexChanges,
+) -> Result<(), Fault> {
     const END: &str = "UPDATE feature_version SET to_version = :version WHERE id = :id AND to_version IS NULL";
-    const END_INDEX: &str = "UPDATE feature_index SET v1 = :last WHERE id = :id";
-    for (fid, LiveRow { id, .. }) in live {
-        let ended = connection.prepare_cached(END)?.execute(named_params! {":version": version.0 as i64, ":id": id})?;
-        let last = version.0 as i64 - 1;
-        let indexed = connection.prepare_cached(END_INDEX)?.execute(named_params! {":last": last, ":id": id})?;
-        if (ended, indexed) != (1, 1) {
-            return Err(Fault::Damage(format!("the live row of feature {fid} has {indexed} rows in the index")));
+    let mut end = connection.prepare_cached(END)?;
+    for (fid, LiveRow { id, state }) in live {
+        let ends = state.bounds().ok().and_then(|bounds| origin.to_index(&bounds));
+        let ended = end.execute(named_params! {":version": version.0 as i64, ":id": id})?;
+        match ends.filter(|_| ended == 1) {
+            Some(ends) => index.end(*id, &ends),
+            None => return Err(Fault::Damage(format!("the live state of feature {fid} cannot end"))),
         }
     }
     Ok(())
 }
 
-/// The statements that write one row and its place in the index, prepared once for all rows of a version.
-struct Inserts<'c> {
+/// The statement that writes one row, prepared once for all rows of a version.
+struct Insert<'c> {
     connection: &'c Connection,
     version: i64,
-    row: CachedStatement<'c>,
-    index: CachedStatement<'c>,
+    statement: CachedStatement<'c>,
 }
 
-impl<'c> Inserts<'c> {
+impl<'c> Insert<'c> {
     fn prepare(connection: &'c Connection, version: VersionId) -> Result<Self, Fault> {
         // Looking up names costs a tenth of loading a city.
         const ROW: &str = "INSERT INTO feature_version (fid, from_version, kind, class, geometry, state)
             VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
-        const INDEX: &str = "INSERT INTO feature_index (id, e0, e1, n0, n1, h0, h1, v0, v1)
-            VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
-        let (row, index) = (connection.prepare_cached(ROW)?, connection.prepare_cached(INDEX)?);
-        Ok(Self { connection, version: version.0 as i64, row, index })
+        Ok(Self { connection, version: version.0 as i64, statement: connection.prepare_cached(ROW)? })
     }
 
-    fn insert(&mut self, fid: Fid, state: &FeatureState, ends: &IndexBox) -> Result<(), Fault> {
+    /// Writes it and returns its id.
+    fn row(&mut self, fid: Fid, state: &FeatureState) -> Result<i64, Fault> {
         let (class, geometry) = (state.class().map(|class| class.0), state.geometry().map(|digest| digest.0));
-        self.row.execute(params![fid.0 as i64, self.version, state.kind_name(), class, geometry, state.to_bytes()])?;
-        let id = self.connection.last_insert_rowid();
-        let [e0, e1, n0, n1, h0, h1] = ends;
-        self.index.execute(params![id, e0, e1, n0, n1, h0, h1, self.version, LIVE])?;
-        Ok(())
+        let (fid, kind) = (fid.0 as i64, state.kind_name());
+        self.statement.execute(params![fid, self.version, kind, class, geometry, state.to_bytes()])?;
+        Ok(self.connection.last_insert_rowid())
     }
 }

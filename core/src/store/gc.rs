@@ -3,6 +3,7 @@
 use super::error::{Fault, StoreError};
 use super::feature_rows::last_fid;
 use super::forgotten::all_remains;
+use super::index;
 use super::map_file::{MapFile, WriteFault};
 use super::operations::{deltas_of, operations_digest};
 use super::rows::{VersionRow, head};
@@ -54,7 +55,7 @@ impl MapFile {
 
     /// Gives the space of what was removed back to the disk: SQLite writes the whole file anew.
     pub fn compact(&self) -> Result<(), StoreError> {
-        self.read(|connection| {
+        self.outside(|connection| {
             Ok(connection.execute_batch(
                 "PRAGMA cache_spill = 1; VACUUM; PRAGMA cache_spill = 0; PRAGMA wal_checkpoint(TRUNCATE)",
             )?)
@@ -246,10 +247,10 @@ fn proven_operations(connection: &Connection, version: VersionId) -> Result<Dige
 }
 
 fn remove(connection: &Connection, plan: &Plan) -> Result<(), Fault> {
+    const DELETE: &str = "DELETE FROM feature_version WHERE id = :id";
+    index::remove(connection, &plan.states.iter().map(|state| state.id).collect())?;
     for state in &plan.states {
-        for sql in ["DELETE FROM feature_index WHERE id = :id", "DELETE FROM feature_version WHERE id = :id"] {
-            connection.prepare_cached(sql)?.execute(named_params! {":id": state.id})?;
-        }
+        connection.prepare_cached(DELETE)?.execute(named_params! {":id": state.id})?;
     }
     for (sql, blobs) in [
         ("DELETE FROM geometry WHERE digest = :digest", &plan.geometries),

@@ -2,7 +2,7 @@
 
 use super::StoreError;
 use super::error::Fault;
-use super::index::IndexOrigin;
+use super::index::{self, Ids, LIVE};
 use super::interface::steps;
 use super::map_file::MapFile;
 use super::observations::{self, RecordedObservation};
@@ -81,19 +81,15 @@ fn counts_in(connection: &Connection, region: &BoxMm) -> Result<BTreeMap<Version
     const ENDED: &str = "SELECT f.fid, f.to_version, 1,
             EXISTS (SELECT 1 FROM feature_version AS n WHERE n.fid = f.fid AND n.from_version = f.to_version)";
     let mut changed = BTreeMap::new();
-    if let Some(ends) = IndexOrigin::read(connection)?.and_then(|origin| origin.clamp(region)) {
-        for (select, condition) in [(BEGAN, ""), (ENDED, "AND i.v1 < 2147483647")] {
-            let sql = format!(
-                "{select} FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-                WHERE i.e0 <= ?2 AND i.e1 >= ?1 AND i.n0 <= ?4 AND i.n1 >= ?3 AND i.h0 <= ?6 AND i.h1 >= ?5
-                    {condition} ORDER BY f.id"
-            );
-            let mut statement = connection.prepare_cached(&sql)?;
-            let mut rows = statement.query(ends)?;
-            while let Some(row) = rows.next()? {
-                let (fid, version): (i64, i64) = (row.get(0)?, row.get(1)?);
-                changed.insert((version, fid), (row.get(2)?, row.get(3)?));
-            }
+    let lives = index::lives_in(connection, region, 0..=LIVE)?;
+    for (select, until) in [(BEGAN, LIVE), (ENDED, LIVE - 1)] {
+        let ids = Ids::of(lives.iter().filter(|life| life.last <= until).map(|life| life.id));
+        let sql = format!("{select} FROM {} ORDER BY f.id", Ids::ROWS);
+        let mut statement = connection.prepare_cached(&sql)?;
+        let mut rows = statement.query(named_params! {":ids": ids.json()})?;
+        while let Some(row) = rows.next()? {
+            let (fid, version): (i64, i64) = (row.get(0)?, row.get(1)?);
+            changed.insert((version, fid), (row.get(2)?, row.get(3)?));
         }
     }
     let mut counts: BTreeMap<VersionId, Counts> = BTreeMap::new();

@@ -2,6 +2,7 @@
 
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
+use super::index::{build_beside, rebuild};
 use super::rows::{VersionRow, check_classes, insert_classes};
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
@@ -9,6 +10,7 @@ use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, named_params};
+use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -16,6 +18,8 @@ use std::time::Duration;
 
 /// Value of `format` in the table `meta`.
 pub(super) const FORMAT: &str = "resurvey.map/1";
+/// The first format whose index this program reads.
+const INDEX_FORMAT: usize = 3;
 /// How long a writer waits for another.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Page cache of a connection, KiB.
@@ -108,7 +112,10 @@ impl MapFile {
                 Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
             };
             let map = map.map_err(|fault| fault.at(path))?;
-            map.check_format()?;
+            if (map.check_format()? as usize) < INDEX_FORMAT {
+                map.outside(|connection| Ok(connection.pragma_update(None, "temp_store", "MEMORY")?))?;
+                map.read(build_beside)?;
+            }
             Ok(map)
         };
         // Reading a file with a write-ahead log needs a shared-memory file beside it, unless nobody can write.
@@ -148,8 +155,18 @@ impl MapFile {
         })
     }
 
-    /// Runs `work`, which reads, and says where it failed.
+    /// Runs `work`, which reads one state of the file whatever is committed meanwhile, and says where it failed.
     pub(super) fn read<T>(&self, work: impl FnOnce(&Connection) -> Result<T, Fault>) -> Result<T, StoreError> {
+        self.outside(|connection| {
+            let frozen = Transaction::new_unchecked(connection, TransactionBehavior::Deferred)?;
+            let found = work(&frozen)?;
+            frozen.commit()?;
+            Ok(found)
+        })
+    }
+
+    /// Runs `work` in no transaction, and says where it failed.
+    pub(super) fn outside<T>(&self, work: impl FnOnce(&Connection) -> Result<T, Fault>) -> Result<T, StoreError> {
         work(&self.connection).map_err(|fault| fault.at(&self.path))
     }
 
@@ -207,7 +224,7 @@ impl MapFile {
         let set = |connection: &Connection| -> Result<String, Fault> {
             Ok(connection.pragma_update_and_check(None, "journal_mode", "WAL", |row| row.get(0))?)
         };
-        match self.read(set)?.as_str() {
+        match self.outside(set)?.as_str() {
             "wal" => Ok(()),
             mode => Err(StoreError::NoWriteAheadLog {
                 path: self.path.clone(),
@@ -218,7 +235,7 @@ impl MapFile {
 
     /// The number of the format, when this program can read it.
     fn check_format(&self) -> Result<i32, StoreError> {
-        let pragma = |name| self.read(|connection| Ok(connection.pragma_query_value(None, name, |row| row.get(0))?));
+        let pragma = |name| self.outside(|connection| Ok(connection.pragma_query_value(None, name, |row| row.get(0))?));
         let path = || self.path.clone();
         let application: i32 = pragma("application_id")?;
         if application != APPLICATION_ID {
@@ -260,8 +277,12 @@ pub(super) fn format_of(connection: &Connection) -> Result<usize, Fault> {
 
 /// Applies the migrations that the file has not had.
 fn migrate(connection: &Connection) -> Result<(), WriteFault<StoreError>> {
-    for migration in MIGRATIONS.iter().skip(format_of(connection)?) {
+    let format = format_of(connection)?;
+    for migration in MIGRATIONS.iter().skip(format) {
         connection.execute_batch(migration)?;
+    }
+    if format < INDEX_FORMAT {
+        rebuild(connection, BTreeMap::new())?;
     }
     connection.pragma_update(None, "user_version", MIGRATIONS.len() as i32)?;
     Ok(())

@@ -4,7 +4,7 @@
 
 use super::error::{Fault, StoreError};
 use super::forgotten::{all_remains, check_state};
-use super::index::IndexOrigin;
+use super::index::{self, Ids};
 use super::rows::{FEATURE_COLUMNS, timestamp};
 use super::states::features;
 use crate::version::{BoxMm, Feature, Fid, VersionId};
@@ -44,24 +44,18 @@ pub(super) fn features_observed(
 
 /// All lives up to `version` of the features that were ever in `region`.
 fn lives_in(connection: &Connection, version: VersionId, region: &BoxMm) -> Result<Vec<Feature>, Fault> {
-    const FIDS: &str = "SELECT DISTINCT f.fid FROM feature_index AS i CROSS JOIN feature_version AS f ON f.id = i.id
-        WHERE i.e0 <= :e1 AND i.e1 >= :e0 AND i.n0 <= :n1 AND i.n1 >= :n0 AND i.h0 <= :h1 AND i.h1 >= :h0
-            AND i.v0 <= :version ORDER BY f.fid";
-    let version = version.0 as i64;
-    let Some(origin) = IndexOrigin::read(connection)? else { return Ok(Vec::new()) };
-    let Some([e0, e1, n0, n1, h0, h1]) = origin.clamp(region) else { return Ok(Vec::new()) };
-    let mut statement = connection.prepare_cached(FIDS)?;
-    let parameters = named_params! {
-        ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1, ":version": version,
-    };
-    let fids = statement.query_map(parameters, |row| row.get::<_, i64>(0))?.collect::<Result<Vec<_>, _>>()?;
+    let ids = Ids::of(index::lives_in(connection, region, 0..=version.0 as i64)?.iter().map(|life| life.id));
+    let mut statement =
+        connection.prepare_cached(&format!("SELECT DISTINCT f.fid FROM {} ORDER BY f.fid", Ids::ROWS))?;
+    let fids = statement.query_map(named_params! {":ids": ids.json()}, |row| row.get::<_, i64>(0))?;
+    let fids = fids.collect::<Result<Vec<_>, _>>()?;
     let sql = format!(
         "SELECT {FEATURE_COLUMNS} FROM feature_version AS f WHERE f.fid = :fid AND f.from_version <= :version
         ORDER BY f.from_version"
     );
     let mut lives = Vec::new();
     for fid in fids {
-        lives.extend(features(connection, &sql, named_params! {":fid": fid, ":version": version})?);
+        lives.extend(features(connection, &sql, named_params! {":fid": fid, ":version": version.0 as i64})?);
     }
     Ok(lives)
 }

@@ -2,7 +2,7 @@
 
 use super::problem::Findings;
 use crate::store::error::Fault;
-use crate::store::index::{IndexOrigin, LIVE};
+use crate::store::index::{Flaw, flaws};
 use crate::store::rows::classes_at;
 use crate::version::{Digest, FeatureState, VersionId};
 use resurvey_schema::ClassTable;
@@ -86,39 +86,11 @@ pub(super) fn life_spans(connection: &Connection, findings: &mut Findings) -> Re
     Ok(())
 }
 
-/// The R*Tree holds the box and the versions of every row, and nothing else.
+/// The index holds the box and the versions of every row, and nothing else.
 pub(super) fn index(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
-    const ROWS: &str = "SELECT f.id, f.fid, f.from_version, f.to_version, f.state,
-            i.id, i.e0, i.e1, i.n0, i.n1, i.h0, i.h1, i.v0, i.v1
-        FROM feature_version AS f LEFT JOIN feature_index AS i ON i.id = f.id ORDER BY f.id";
-    const STRAYS: &str = "SELECT i.id FROM feature_index AS i LEFT JOIN feature_version AS f ON f.id = i.id
-        WHERE f.id IS NULL ORDER BY i.id";
-    let origin = IndexOrigin::read(connection)?;
-    let mut statement = connection.prepare(ROWS)?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        let (fid, from, to): (i64, i64, Option<i64>) = (row.get(1)?, row.get(2)?, row.get(3)?);
-        let place = || format!("feature {fid} from version {from}");
-        if row.get::<_, Option<i64>>(5)?.is_none() {
-            findings.add(place(), "is not in the index");
-            continue;
-        }
-        let mut found = [0; 8];
-        for (column, value) in found.iter_mut().enumerate() {
-            *value = row.get(6 + column)?;
-        }
-        let Ok(state) = state(row, "state")? else { continue };
-        let ends = state.bounds().ok().and_then(|bounds| origin?.to_index(&bounds));
-        let expected =
-            ends.map(|[e0, e1, n0, n1, h0, h1]| [e0, e1, n0, n1, h0, h1, from, to.map_or(LIVE, |to| to - 1)]);
-        if expected != Some(found) {
-            findings.add(place(), format!("the index has {found:?}, expected {expected:?}"));
-        }
-    }
-    let mut statement = connection.prepare(STRAYS)?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        findings.add(format!("index row {}", row.get::<_, i64>(0)?), "belongs to no feature");
+    for flaw in flaws(connection)?.0 {
+        let (Flaw::Wrong { place, detail } | Flaw::Stray { place, detail }) = flaw;
+        findings.add(place, detail);
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::{evidence, features, file, history};
 use crate::store::error::{Fault, StoreError};
 use crate::store::map_file::MapFile;
-use rusqlite::{Connection, Transaction, TransactionBehavior};
+use rusqlite::Connection;
 use std::fmt;
 
 /// One thing that does not hold.
@@ -74,11 +74,10 @@ impl MapFile {
     /// Checks everything that must hold in the map as it is now; empty when all is well. Reads the whole file.
     pub fn fsck(&self) -> Result<Vec<Problem>, StoreError> {
         self.read(|connection| {
-            let frozen = Transaction::new_unchecked(connection, TransactionBehavior::Deferred)?;
             let mut problems = Vec::new();
             for (name, check) in CHECKS {
                 let mut findings = Findings { check: name, problems: Vec::new(), left_out: 0 };
-                if let Err(fault) = check(&frozen, &mut findings) {
+                if let Err(fault) = check(connection, &mut findings) {
                     // Damage that keeps a check from going on is itself what it found.
                     match fault.at(&self.path) {
                         StoreError::Damaged { detail, .. } | StoreError::Internal { detail, .. } => {

@@ -3,7 +3,7 @@
 use super::fsck::eventful;
 use super::*;
 use crate::store::StoreError;
-use crate::version::{BoxMm, Digest};
+use crate::version::{BoxMm, Delta, Digest};
 use std::path::PathBuf;
 
 fn fixture(format: u32) -> PathBuf {
@@ -18,33 +18,59 @@ fn copy(format: u32) -> (TempDir, PathBuf) {
     (directory, path)
 }
 
-/// Never for a released format: `cargo test -p resurvey-core --lib -- --ignored make_the_map_of_format_2`.
+/// Never for a released format: `cargo test -p resurvey-core --lib -- --ignored make_the_map_of_format_3`. Of its cells one
+/// has a second block.
 #[test]
-#[ignore = "writes tests/fixtures/map-format-2.rsv"]
-fn make_the_map_of_format_2() {
+#[ignore = "writes tests/fixtures/map-format-3.rsv"]
+fn make_the_map_of_format_3() {
     let Scratch { directory, map } = eventful();
-    let mut update = transaction(4);
-    update.additions = vec![chair(30.0)];
-    update.viewed_region = Some(region());
-    update.observed_at = Some(at(6));
-    map.commit(&update, at(7)).unwrap();
-    map.gc(Some(VersionId(4)), at(8)).unwrap();
+    let mut banners = transaction(4);
+    banners.additions = (0..BANNERS).map(|number| banner(0.01 * f64::from(number))).collect();
+    map.commit(&banners, at(6)).unwrap();
+    for version in 5..5 + TURNS {
+        let live = map.snapshot(VersionId(version)).unwrap().features(None).unwrap();
+        let mut update = transaction(version);
+        update.deltas = live
+            .into_iter()
+            .rev()
+            .take(BANNERS as usize)
+            .map(|feature| {
+                let after = banner(0.01 * f64::from(feature.fid.0 as u32) + 0.001 * version as f64);
+                Delta::modify(feature.fid, feature.state, after)
+            })
+            .collect();
+        map.commit(&update, at(7)).unwrap();
+    }
     let path = map.path().to_owned();
     drop(map);
-    std::fs::copy(path, fixture(2)).unwrap();
+    std::fs::copy(path, fixture(3)).unwrap();
     drop(directory);
 }
 
-/// What version 5 of the map of format 2 looked at.
-fn region() -> BoxMm {
-    BoxMm::of_plan(835_560.0, 817_840.0, 835_570.0, 817_850.0).unwrap()
+/// Banners that every version from 6 on moves, and the number of these versions.
+const BANNERS: u32 = 12;
+const TURNS: u64 = 6;
+
+#[test]
+fn the_map_of_format_3_opens_with_the_blocks_of_its_index() {
+    let (_directory, path) = copy(3);
+    let map = MapFile::open(&path).unwrap();
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 3));
+    let blocks = "SELECT max(count) FROM (SELECT count(*) AS count FROM feature_index GROUP BY cell) ORDER BY 1";
+    let most: i64 = map.read(|connection| Ok(connection.query_row(blocks, [], |row| row.get(0))?)).unwrap();
+    assert!(most > 1, "no cell has a second block");
+    for version in 0..=5 + TURNS {
+        let snapshot = map.snapshot(VersionId(version)).unwrap();
+        let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+        assert_eq!(snapshot.features(Some(&everywhere)), snapshot.features(None));
+    }
 }
 
 #[test]
 fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
     let (_directory, path) = copy(2);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 2));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 3));
     let gone = StoreError::Forgotten { version: VersionId(3), next: VersionId(4) };
     assert_eq!(map.snapshot(VersionId(3)).err(), Some(gone));
     let chair_then = map.snapshot(VersionId(1)).unwrap().feature(Fid(2)).unwrap().state;
@@ -64,12 +90,15 @@ fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() 
     let before = std::fs::read(&path).unwrap();
     let reader = MapFile::open_read_only(&path).unwrap();
     assert_eq!((reader.info().unwrap().format, reader.fsck()), (1, Ok(Vec::new())));
-    assert_eq!(reader.snapshot(VersionId(2)).unwrap().features(None).unwrap().len(), 4);
+    let snapshot = reader.snapshot(VersionId(2)).unwrap();
+    assert_eq!(snapshot.features(None).unwrap().len(), 4);
+    let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+    assert_eq!(snapshot.features(Some(&everywhere)), snapshot.features(None));
     assert_eq!(reader.gc_plan(Some(VersionId(4))).unwrap().versions, [VersionId(2), VersionId(3)]);
     drop(reader);
     assert_eq!(std::fs::read(&path).unwrap(), before);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.info().unwrap().format, map.fsck()), (2, Ok(Vec::new())));
+    assert_eq!((map.info().unwrap().format, map.fsck()), (3, Ok(Vec::new())));
     map.gc(Some(VersionId(4)), at(9)).unwrap();
     assert_eq!(map.fsck(), Ok(Vec::new()));
 }

@@ -92,13 +92,31 @@ fn a_changed_state_breaks_the_hash_of_its_version_alone() {
     assert!(chain.len() == 1 && chain[0].starts_with("versions: version 2: has hash"), "{problems:#?}");
 }
 
+/// As the index has it, the row 2 lived for the two versions from 1 on.
+pub(super) const BANNER_IS_ROW_99: &str = "UPDATE feature_index SET lives = CAST(x'63' || substr(lives, 2) AS BLOB)
+    WHERE substr(lives, 1, 3) = x'020102'";
+pub(super) const BANNER_IS_LIVE: &str = "UPDATE feature_index
+    SET lives = CAST(substr(lives, 1, 2) || x'00' || substr(lives, 4) AS BLOB) WHERE substr(lives, 1, 3) = x'020102'";
+
 /// What is done to the file, and how the problem that names it starts.
 const DAMAGE: &[(&str, &str)] = &[
     // The index.
-    ("DELETE FROM feature_index WHERE id = 2", "index: feature 1 from version 1: is not in the index"),
-    ("UPDATE feature_index SET e0 = e0 - 1 WHERE id = 1", "index: feature 2 from version 1: the index has"),
-    ("UPDATE feature_index SET v1 = 2147483647 WHERE id = 2", "index: feature 1 from version 1: the index has"),
-    ("INSERT INTO feature_index VALUES (99, 0, 1, 0, 1, 0, 1, 0, 1)", "index: index row 99: belongs to no feature"),
+    ("DELETE FROM feature_index", "index: feature 3 from version 2: is not in the index"),
+    ("DELETE FROM feature_index WHERE from_version = 2", "index: feature 4 from version 2: is not in the index"),
+    ("UPDATE feature_index SET cell = cell + 1", "index: feature 2 from version 1: the index has it in cell"),
+    ("UPDATE feature_index SET from_version = 2", "index: feature 2 from version 1: the index of its cell begins with"),
+    (
+        "UPDATE feature_index SET lives = CAST(substr(lives, 1, length(lives) - 1) AS BLOB)",
+        "index: cell 80580489677: block of cell 80580489677 from version 1: byte",
+    ),
+    // The banner of version 1, the first of its block: its number, its end, its box.
+    (BANNER_IS_ROW_99, "index: index row 99: belongs to no feature"),
+    (BANNER_IS_LIVE, "index: feature 1 from version 1: the index has"),
+    (
+        "UPDATE feature_index SET lives = CAST(substr(lives, 1, 3) || x'80' || substr(lives, 5) AS BLOB)
+        WHERE substr(lives, 1, 3) = x'020102'",
+        "index: feature 1 from version 1: the index has",
+    ),
     // Life spans.
     (
         "UPDATE feature_version SET to_version = 4 WHERE fid = 1 AND to_version = 3",

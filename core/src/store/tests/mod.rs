@@ -7,6 +7,7 @@ mod fixture;
 mod forget;
 mod fsck;
 mod history;
+mod index;
 mod measure;
 mod observed;
 mod open;

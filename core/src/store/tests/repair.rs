@@ -1,6 +1,6 @@
 //! Mending what can be worked out, and nothing else.
 
-use super::fsck::{damage, eventful};
+use super::fsck::{BANNER_IS_LIVE, BANNER_IS_ROW_99, damage, eventful};
 use super::*;
 use crate::version::Digest;
 
@@ -25,14 +25,12 @@ fn a_sound_map_is_left_alone() {
 #[test]
 fn what_the_states_say_is_mended_and_named() {
     for (sql, expected) in [
-        ("DELETE FROM feature_index WHERE id = 2", "index: feature 1 from version 1: put into the index"),
-        ("DELETE FROM feature_index", "index: feature 3 from version 2: put into the index"),
-        ("UPDATE feature_index SET e0 = e0 - 1 WHERE id = 1", "index: feature 2 from version 1: put into the index"),
-        (
-            "UPDATE feature_index SET v1 = 2147483647 WHERE id = 2",
-            "index: feature 1 from version 1: put into the index",
-        ),
-        ("INSERT INTO feature_index VALUES (99, 0, 1, 0, 1, 0, 1, 0, 1)", "index: index row 99: removed"),
+        ("DELETE FROM feature_index WHERE from_version = 2", "index: feature 3 from version 2: put into the index"),
+        ("DELETE FROM feature_index", "index: feature 1 from version 3: put into the index"),
+        ("UPDATE feature_index SET cell = cell - 1", "index: feature 2 from version 1: put into the index"),
+        (BANNER_IS_LIVE, "index: feature 1 from version 1: put into the index"),
+        (BANNER_IS_ROW_99, "index: index row 99: removed: belongs to no feature"),
+        ("UPDATE feature_index SET lives = x'80'", "index: cell 80580489677: removed: block of cell"),
         ("UPDATE meta SET index_e0 = NULL, index_n0 = NULL", "meta: meta: chose the origin of the index anew"),
         ("INSERT INTO geometry VALUES (zeroblob(32), x'00')", "geometry: meshes: removed 1"),
         ("INSERT INTO label_image VALUES (zeroblob(32), x'00')", "observations: label images: removed 1"),

@@ -1,32 +1,29 @@
-//! From boxes in the map frame to the 32-bit millimetres of the R*Tree, and the order in which rows are written.
+//! From boxes in the map frame to the 32-bit millimetres of the index, and the order in which rows are written.
 
-use super::error::Fault;
+use crate::store::error::Fault;
 use crate::version::BoxMm;
 use rusqlite::{Connection, OptionalExtension, named_params};
 
-/// Last version of a row that is live, in the index.
-pub(super) const LIVE: i64 = i32::MAX as i64;
-
 /// What is subtracted from eastings and northings so that they fit in 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct IndexOrigin {
+pub(in crate::store) struct IndexOrigin {
     e0: i64,
     n0: i64,
 }
 
 /// Ends in the index: easting, northing, height, lower then upper each.
-pub(super) type IndexBox = [i64; 6];
+pub(in crate::store) type IndexBox = [i64; 6];
 
 impl IndexOrigin {
     /// The origin of this map; `None` before its first feature.
-    pub(super) fn read(connection: &Connection) -> Result<Option<Self>, Fault> {
+    pub(in crate::store) fn read(connection: &Connection) -> Result<Option<Self>, Fault> {
         const SQL: &str = "SELECT index_e0, index_n0 FROM meta WHERE index_e0 IS NOT NULL ORDER BY only_row";
         let mut statement = connection.prepare_cached(SQL)?;
         Ok(statement.query_row([], |row| Ok(Self { e0: row.get(0)?, n0: row.get(1)? })).optional()?)
     }
 
     /// Zero where `envelope` fits around it, else the whole kilometre nearest its middle.
-    pub(super) fn choose(envelope: &BoxMm) -> Self {
+    pub(in crate::store) fn choose(envelope: &BoxMm) -> Self {
         let zero = Self { e0: 0, n0: 0 };
         if zero.to_index(envelope).is_some() {
             return zero;
@@ -37,20 +34,20 @@ impl IndexOrigin {
     }
 
     /// Writes it down, once for the map.
-    pub(super) fn write(&self, connection: &Connection) -> Result<(), Fault> {
+    pub(in crate::store) fn write(&self, connection: &Connection) -> Result<(), Fault> {
         const SQL: &str = "UPDATE meta SET index_e0 = :e0, index_n0 = :n0 WHERE index_e0 IS NULL";
         connection.execute(SQL, named_params! {":e0": self.e0, ":n0": self.n0})?;
         Ok(())
     }
 
     /// `bounds` in the index; `None` when an end does not fit in 32 bits.
-    pub(super) fn to_index(self, bounds: &BoxMm) -> Option<IndexBox> {
+    pub(in crate::store) fn to_index(self, bounds: &BoxMm) -> Option<IndexBox> {
         let ends = self.shift(bounds);
         ends.iter().all(|&end| i32::try_from(end).is_ok()).then_some(ends)
     }
 
     /// The part of `region` that the index can hold; `None` when there is none.
-    pub(super) fn clamp(self, region: &BoxMm) -> Option<IndexBox> {
+    pub(in crate::store) fn clamp(self, region: &BoxMm) -> Option<IndexBox> {
         let (low, high) = (i64::from(i32::MIN), i64::from(i32::MAX));
         let ends = self.shift(region);
         let reaches = (0..3).all(|axis| ends[2 * axis] <= high && ends[2 * axis + 1] >= low);
@@ -58,7 +55,7 @@ impl IndexOrigin {
     }
 
     /// The box whose ends in the index are `ends`.
-    pub(super) fn box_at(self, ends: &IndexBox) -> Option<BoxMm> {
+    pub(in crate::store) fn box_at(self, ends: &IndexBox) -> Option<BoxMm> {
         let [e0, e1, n0, n1, h0, h1] = *ends;
         BoxMm::from_mm([e0 + self.e0, n0 + self.n0, h0], [e1 + self.e0, n1 + self.n0, h1])
     }
@@ -71,7 +68,7 @@ impl IndexOrigin {
 
 /// Position of the middle of `ends` along a Hilbert curve over the plan: neighbours on the map become neighbours in
 /// the file (Warren, Hacker's Delight, 16-4).
-pub(super) fn hilbert_key(ends: &IndexBox) -> u64 {
+pub(in crate::store) fn hilbert_key(ends: &IndexBox) -> u64 {
     let middle = |axis: usize| (((ends[2 * axis] + ends[2 * axis + 1]) / 2) - i64::from(i32::MIN)) as u32;
     let (mut x, mut y) = (middle(0), middle(1));
     let mut key = 0;

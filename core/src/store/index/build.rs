@@ -1,0 +1,70 @@
+//! Making the index anew from the rows of features.
+
+use super::block::{Block, LIVE, Life};
+use super::cell::Cell;
+use super::origin::IndexOrigin;
+use super::write::insert;
+use crate::store::error::Fault;
+use crate::version::FeatureState;
+use resurvey_schema::sql::INDEX_BESIDE;
+use rusqlite::{Connection, Row};
+use std::collections::BTreeMap;
+
+/// The columns that [`life`] reads, of `feature_version` as `f`.
+pub(super) const LIFE_COLUMNS: &str = "f.id, f.fid, f.from_version, f.to_version, f.state";
+
+/// The cell and life that the index should have of a row; `None` where its state has no box in it.
+pub(super) fn life(row: &Row, origin: Option<IndexOrigin>) -> Result<Option<(Cell, Life)>, Fault> {
+    let (first, to): (i64, Option<i64>) = (row.get(2)?, row.get(3)?);
+    let state = FeatureState::from_bytes(row.get_ref(4)?.as_blob().map_err(rusqlite::Error::from)?);
+    let bounds = state.ok().and_then(|state| state.bounds().ok());
+    let ends = bounds.and_then(|bounds| origin?.to_index(&bounds));
+    let last = to.map_or(LIVE, |to| to.saturating_sub(1));
+    let id = row.get(0)?;
+    Ok(ends.map(|ends| (Cell::of(&ends), Life { id, ends, first, last })))
+}
+
+/// Makes the index of a map that has another one, or none, for this connection alone.
+pub(in crate::store) fn build_beside(connection: &Connection) -> Result<(), Fault> {
+    connection.execute_batch(INDEX_BESIDE)?;
+    rebuild(connection, BTreeMap::new())
+}
+
+/// Makes the index anew. `kept` are lives of rows whose state says nothing of their box.
+pub(in crate::store) fn rebuild(connection: &Connection, kept: BTreeMap<i64, Life>) -> Result<(), Fault> {
+    let origin = IndexOrigin::read(connection)?;
+    connection.execute("DELETE FROM feature_index", [])?;
+    let mut lives: Vec<(Cell, Life)> = kept.into_values().map(|life| (Cell::of(&life.ends), life)).collect();
+    let sql = format!("SELECT {LIFE_COLUMNS} FROM feature_version AS f ORDER BY f.id");
+    let mut statement = connection.prepare(&sql)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        lives.extend(life(row, origin)?.filter(|(_, life)| life.first <= life.last));
+    }
+    lives.sort_unstable_by_key(|(cell, life)| (*cell, life.id));
+    for of_cell in lives.chunk_by(|a, b| a.0 == b.0) {
+        let lives: Vec<Life> = of_cell.iter().map(|(_, life)| *life).collect();
+        for block in blocks_of(of_cell[0].0, &lives)? {
+            insert(connection, &block)?;
+        }
+    }
+    Ok(())
+}
+
+/// The blocks of a cell, as its versions would have written them one after the other.
+pub(super) fn blocks_of(cell: Cell, lives: &[Life]) -> Result<Vec<Block>, Fault> {
+    let mut versions: BTreeMap<i64, (Vec<i64>, Vec<Life>)> = BTreeMap::new();
+    for life in lives {
+        versions.entry(life.first).or_default().1.push(Life { last: LIVE, ..*life });
+        if life.last < LIVE {
+            versions.entry(life.last + 1).or_default().0.push(life.id);
+        }
+    }
+    let (mut blocks, mut open) = (Vec::new(), None);
+    for (version, (ended, begun)) in versions {
+        let block = open.get_or_insert_with(|| Block::first(cell, version, Vec::new()));
+        blocks.extend(block.advance(version, &ended, &begun)?);
+    }
+    blocks.extend(open);
+    Ok(blocks)
+}
