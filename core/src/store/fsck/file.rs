@@ -8,7 +8,7 @@ use resurvey_schema::sql::MIGRATIONS;
 use rusqlite::Connection;
 use std::collections::BTreeMap;
 
-/// Pages, indexes, column types, CHECK constraints and the inner structure of the R*Tree.
+/// Pages, indexes, column types and CHECK constraints.
 pub(super) fn sqlite(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
     complaints(connection)?.into_iter().for_each(|complaint| findings.add("file", complaint));
     Ok(())

@@ -8,7 +8,6 @@ mod forget;
 mod fsck;
 mod history;
 mod index;
-mod measure;
 mod observed;
 mod open;
 mod repair;
