@@ -17,7 +17,7 @@ mod undo;
 use super::conformance::{Subject, at, banner, chair, content, moves, new_map, play, transaction};
 use super::{CommitError, History, MapFile, NewMap};
 use crate::version::{FeatureState, Fid, VersionId};
-use resurvey_schema::{ClassId, ClassTable, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Uncertainty};
+use resurvey_schema::{ClassId, ClassTable, Descriptor, DynamicDescriptor, GridPoint};
 use tempfile::TempDir;
 
 /// A map in a directory of its own.
