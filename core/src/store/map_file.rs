@@ -155,9 +155,13 @@ impl MapFile {
         })
     }
 
-    /// Runs `work`, which reads one state of the file whatever is committed meanwhile, and says where it failed.
+    /// Runs `work`, which reads one state of the file whatever is committed meanwhile, and says where it failed: in the
+    /// transaction that is under way, or in one of its own.
     pub(super) fn read<T>(&self, work: impl FnOnce(&Connection) -> Result<T, Fault>) -> Result<T, StoreError> {
         self.outside(|connection| {
+            if !connection.is_autocommit() {
+                return work(connection);
+            }
             let frozen = Transaction::new_unchecked(connection, TransactionBehavior::Deferred)?;
             let found = work(&frozen)?;
             frozen.commit()?;
