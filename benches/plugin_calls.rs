@@ -26,7 +26,8 @@ fn main() {
     let opened = Registry::new([digest(&skyline)]).load_file(&skyline).unwrap();
     let apart = isolated(&skyline);
     println!("file read, hashed, started, ended         {:>9.2} ms", best_ms(40, || drop(isolated(&skyline))));
-    let mut held = Vec::new();
+    // The process that is there already is taken first.
+    let mut held = vec![matcher(&apart)];
     println!("start of a process with an instance       {:>9.2} ms", best_ms(40, || held.push(matcher(&apart))));
     drop(held);
     println!("instance in a process that is there       {:>9.1} µs", 1e3 * best_ms(200, || drop(matcher(&apart))));
