@@ -1,0 +1,48 @@
+"""Plugins for resurvey in Python: a matcher, a change detector or a descriptor estimator is one class.
+
+    class Agreement(Plugin):
+        NAME, VERSION, SUMMARY = "agreement", "1.0.0", "Share of pixels whose class is the same"
+
+        def score(self, photo, view):
+            return float((photo == view.labels).mean())
+
+    if __name__ == "__main__":
+        main(Agreement)
+
+It runs in a process of its own and speaks the wire of docs/plugin-wire.md. NumPy is needed: images are arrays.
+`resurvey_plugin.toy` is a small world for tests without a map; `python3 -m resurvey_plugin build FILE` makes the one file
+that the host runs.
+"""
+
+from .plugin import Cancelled, Failed, Plugin, declaration
+from .records import (
+    CLASS_COUNTS,
+    Alignment,
+    Camera,
+    ClassInfo,
+    Comparison,
+    DynamicDescriptor,
+    Estimate,
+    Localization,
+    MaterialDescriptor,
+    Photo,
+    Place,
+    Pose,
+    Prior,
+    Region,
+    Reject,
+    Remove,
+    RunnerUp,
+    View,
+)
+from .serve import main
+
+VOID = 255
+"""Class of a pixel that is not labelled; it is never compared."""
+
+__version__ = "0.1.0"
+__all__ = [
+    "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "DynamicDescriptor", "Estimate",
+    "Failed", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "Prior", "Region", "Reject",
+    "Remove", "RunnerUp", "View", "declaration", "main",
+]

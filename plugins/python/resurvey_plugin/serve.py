@@ -1,0 +1,145 @@
+"""The conversation of docs/plugin-wire.md: calls of the host become calls of the author's class."""
+
+import json
+import os
+import stat
+import sys
+import traceback
+
+import numpy as np
+
+from . import words
+from .host import Host, ask, views
+from .link import Ended, Link
+from .plugin import Cancelled, Failed, Settings, hello
+from .records import Comparison, Localization, Photo, Region
+
+_REGIONS_IN_A_MESSAGE = 500
+_TEXT = 10_000
+_OWN = os.path.dirname(os.path.abspath(__file__))
+
+
+def main(plugin):
+    """Serves `plugin` to the host that started this process; returns when the host is done."""
+    words_of_plugin = hello(plugin)
+    if not stat.S_ISSOCK(os.fstat(1).st_mode):
+        raise SystemExit(f"{plugin.NAME} is a plugin: the host starts it. Try resurvey plugins check {sys.argv[0]}")
+    serve(plugin, words_of_plugin, Link.of_this_process())
+
+
+def serve(plugin, words_of_plugin, link):
+    """Serves over `link` until it ends."""
+    try:
+        link.send("hello", words_of_plugin)
+        instance = None
+        while True:
+            call, value = link.receive()
+            instance = _answer(link, plugin, instance, call, value)
+    except Ended:
+        return
+
+
+def _answer(link, plugin, instance, call, value):
+    """Answers one call; gives the instance for the next."""
+    link.grown_to(value.get("memory") or value.get("comparison", {}).get("memory", 0))
+    done = {}
+    try:
+        if call == "create":
+            instance = plugin(Settings(json.loads(value["settings"] or "{}")))
+        elif call == "destroy":
+            instance = None
+        elif call in _SERVED:
+            done = _SERVED[call](link, instance, value)
+        else:
+            raise ValueError(f"expected a call of wire 1, found {call}")
+    except Ended:
+        raise
+    except Cancelled:
+        link.send("cancelled", {})
+    except Failed as failure:
+        if link.cancelled():
+            link.send("cancelled", {})
+        else:
+            link.send("failed", {"text": str(failure)[:_TEXT]})
+    except BaseException as error:  # A SystemExit of the author is a bug as well, and is told as one.
+        traceback.print_exc()
+        link.send("panicked", {"text": _told(error)})
+    else:
+        link.send("done", done)
+    return instance
+
+
+def _told(error):
+    """The error, and the line of the author's file it came through last."""
+    text = "".join(traceback.format_exception_only(type(error), error)).strip()
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if os.path.dirname(os.path.abspath(frame.filename)) != _OWN]
+    frame = (own or list(frames))[-1]
+    return f"{text[:_TEXT]} ({os.path.basename(frame.filename)}:{frame.lineno})"
+
+
+def _score(link, instance, value):
+    photo, scores = link.lent(value["photo"]), link.place(value["scores"])
+    for index, view in enumerate(views(link, value["views"])):
+        if link.cancelled():
+            raise Cancelled
+        scores[index] = instance.score(photo, view)
+        link.scored_one()
+    return {}
+
+
+def _search(link, instance, value):
+    photo = Photo(link.lent(value["photo"]), words.camera(value["camera"]), words.prior(value["prior"]))
+    found = instance.search(photo, Host(link, value))
+    if not isinstance(found, Localization):
+        raise TypeError(f"expected search to return a Localization, found {type(found).__name__}")
+    heat = np.asarray(found.heat, dtype="<f8").reshape(-1, 3)
+    most = max(1, value["scratch"]["bytes"] // 24)
+    for start in range(0, len(heat), most):
+        cells, _ = link.put(heat[start:start + most], value["scratch"]["offset"])
+        ask(link, "heat", {"cells": cells})
+    return {"localization": words.localization(found)}
+
+
+def _detect(link, instance, value):
+    regions = list(instance.detect(_comparison(link, value), Host(link, value)))
+    start, scratch = 0, value["scratch"]
+    while start < len(regions):
+        offset, message = scratch["offset"], []
+        for region in regions[start:start + _REGIONS_IN_A_MESSAGE]:
+            mask = (np.asarray(region.mask) != 0).astype("u1")
+            if message and offset + mask.nbytes > scratch["offset"] + scratch["bytes"]:
+                break
+            words_of_mask, offset = link.put(mask, offset)
+            message.append(_region(region, mask, words_of_mask))
+        ask(link, "regions", message)
+        start += len(message)
+    return {}
+
+
+def _region(region, mask, words_of_mask):
+    if mask.ndim != 2:
+        raise ValueError(f"expected a mask of rows and columns, found an array of shape {mask.shape}")
+    left, top = int(region.left), int(region.top)
+    bounds = [left, top, left + mask.shape[1], top + mask.shape[0]]
+    return {"class_before": int(region.class_before), "class_after": int(region.class_after), "bounds": bounds,
+            "pixels": int(np.count_nonzero(mask)), "mask": words_of_mask}
+
+
+def _estimate(link, instance, value):
+    comparison = value["comparison"]
+    regions = [Region(item["class_before"], item["class_after"], item["bounds"][0], item["bounds"][1],
+                      link.lent(item["mask"])) for item in value["regions"]]
+    found = instance.estimate(_comparison(link, comparison), regions, Host(link, comparison))
+    proposals = [words.proposal(proposal, regions) for proposal in found]
+    for start in range(0, len(proposals), _REGIONS_IN_A_MESSAGE):
+        ask(link, "proposals", proposals[start:start + _REGIONS_IN_A_MESSAGE])
+    return {}
+
+
+def _comparison(link, value):
+    view, = views(link, value["views"])
+    return Comparison(link.lent(value["photo"]), view, words.camera(value["camera"]), words.estimate(value["estimate"]))
+
+
+_SERVED = {"score": _score, "search": _search, "detect": _detect, "estimate": _estimate}

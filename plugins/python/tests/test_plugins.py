@@ -1,0 +1,333 @@
+"""Plugins in processes of their own, over the wire."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+from resurvey_plugin import Pose, Region, toy
+
+from .fake import PACKAGE, FakeHost, python
+
+HEAD = '''
+import numpy as np
+from resurvey_plugin import *
+class Plug(Plugin):
+    NAME, VERSION, SUMMARY = "plug", "1.0.0", "A plugin of the tests"
+    SETTINGS = {"void": {"type": "integer", "default": 255}}
+'''
+SCORER = HEAD + '''
+    def score(self, photo, view):
+        compared = photo != self.settings.void
+        if not compared.any():
+            raise Failed("every pixel of the photo is void")
+        return (photo == view.labels)[compared].mean()
+main(Plug)
+'''
+ELSEWHERE = Pose(toy.POSE.easting_m + 1.0, toy.POSE.northing_m, toy.POSE.height_m)
+
+
+def started(body, world=None):
+    """A host with a plugin that has said hello and has been created."""
+    host = FakeHost(python(body if body.startswith("\nimport") else HEAD + body + "\nmain(Plug)\n"), world)
+    assert host.raw()[0] == "hello"
+    assert host.create({"void": 255}) == ("done", {})
+    return host
+
+
+class AMatcherThatScores(unittest.TestCase):
+    def test_hello_says_what_the_class_says(self):
+        with FakeHost(python(SCORER)) as host:
+            name, words = host.raw()
+            schema = json.loads(words.pop("settings_schema"))
+            self.assertEqual((name, words), ("hello", {
+                "wire": 1, "kind": "matcher", "name": "plug", "version": "1.0.0", "summary": "A plugin of the tests",
+                "form": "score"}))
+            self.assertEqual(schema["properties"], {"void": {"type": "integer", "default": 255}})
+
+    def test_it_scores_a_batch_and_counts_each_view(self):
+        world = toy.street()
+        photo, views = world.photo(toy.POSE).labels, [world.view(pose) for pose in (toy.POSE, ELSEWHERE)]
+        with started(SCORER, world) as host:
+            answer, scores = host.score(photo, views)
+            self.assertEqual(answer, ("done", {}))
+            self.assertEqual(scores.tolist(), [1.0, (photo == views[1].labels).mean()])
+            self.assertEqual(int.from_bytes(host.memory[16:20], "little"), 2)
+
+    def test_padded_rows_give_the_same_scores(self):
+        world = toy.street(40, 30)
+        photo, views = world.photo(toy.POSE).labels, [world.view(ELSEWHERE)]
+        with started(SCORER, world) as host:
+            self.assertEqual(host.score(photo, views)[1].tolist(), host.score(photo, views, padding=7)[1].tolist())
+
+    def test_batches_sent_ahead_are_answered_in_order(self):
+        world = toy.street(40, 30)
+        photo, views = world.photo(toy.POSE).labels, [world.view(toy.POSE)]
+        with started(SCORER, world) as host:
+            value = {"photo": host.lend(photo), "views": host.stack(views)}
+            places = [host.lend(np.full(1, np.nan)) for _ in range(2)]
+            for scores in places:
+                host.send("score", {**value, "scores": scores, "memory": host.size})
+            self.assertEqual([host.raw(), host.raw()], [("done", {})] * 2)
+            self.assertEqual([host.read(scores)[0] for scores in places], [1.0, 1.0])
+
+    def test_no_answer_is_told_and_the_next_call_is_served(self):
+        world = toy.street(40, 30)
+        view = world.view(toy.POSE)
+        with started(SCORER, world) as host:
+            answer, _ = host.score(np.full_like(view.labels, 255), [view])
+            self.assertEqual(answer, ("failed", {"text": "every pixel of the photo is void"}))
+            self.assertEqual(host.score(view.labels, [view])[1].tolist(), [1.0])
+
+    def test_a_cancel_ends_the_batch(self):
+        world = toy.street(40, 30)
+        view = world.view(toy.POSE)
+        with started(SCORER, world) as host:
+            host.memory[8] = 1
+            self.assertEqual(host.score(view.labels, [view])[0], ("cancelled", {}))
+
+    def test_the_next_instance_gets_its_own_settings(self):
+        world = toy.street(40, 30)
+        view = world.view(toy.POSE)
+        half = view.labels.copy()
+        half[:, :20] = 7
+        with started(SCORER, world) as host:
+            self.assertLess(host.score(half, [view])[1][0], 1.0)
+            self.assertEqual(host.ask("destroy", {}), ("done", {}))
+            self.assertEqual(host.create({"void": 7}), ("done", {}))
+            self.assertEqual(host.score(half, [view])[1][0], 1.0)
+
+
+class WhatGoesWrong(unittest.TestCase):
+    def test_an_exception_is_told_with_file_and_line_and_the_traceback_is_kept(self):
+        source = HEAD + "    def score(self, photo, view):\n        return 1 / 0\nmain(Plug)\n"
+        world = toy.street(40, 30)
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "broken.py")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(source)
+            host = FakeHost([sys.executable, path], world)
+            host.raw(), host.create({"void": 1})
+            answer, _ = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])
+            self.assertEqual(answer, ("panicked", {"text": "ZeroDivisionError: division by zero (broken.py:8)"}))
+            code, last_words = host.close()
+        self.assertEqual(code, 0)
+        self.assertIn("Traceback", last_words)
+
+    def test_prints_and_readers_leave_the_wire_alone(self):
+        world = toy.street(40, 30)
+        view = world.view(toy.POSE)
+        host = started('''
+    def score(self, photo, view):
+        import os, sys
+        print("to stdout")
+        os.write(1, b"to descriptor 1\\n")
+        assert sys.stdin.read() == ""
+        return 0.5
+''', world)
+        self.assertEqual(host.score(view.labels, [view])[1].tolist(), [0.5])
+        code, last_words = host.close()
+        self.assertEqual(code, 0)
+        self.assertEqual(sorted(last_words.split("\n")), ["", "to descriptor 1", "to stdout"])
+
+    def test_what_is_lent_cannot_be_written_to(self):
+        world = toy.street(40, 30)
+        view = world.view(toy.POSE)
+        for what in ("photo", "view.labels", "view.points", "view.range_m", "view.features", "view.origin"):
+            with self.subTest(what), started(f"    def score(self, photo, view):\n        {what}[0] = 1\n", world) as host:
+                name, value = host.score(view.labels, [view])[0]
+                self.assertEqual(name, "panicked")
+                self.assertIn("read-only", value["text"])
+
+    def test_a_call_to_exit_is_a_bug_and_not_an_end(self):
+        world = toy.street(40, 30)
+        with started("    def score(self, photo, view):\n        exit(0)\n", world) as host:
+            self.assertEqual(host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0][0], "panicked")
+
+    def test_settings_that_the_class_does_not_have_are_named(self):
+        world = toy.street(40, 30)
+        with started("    def score(self, photo, view):\n        return self.settings.viod\n", world) as host:
+            name, value = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0]
+            self.assertEqual(name, "panicked")
+            self.assertIn("no setting 'viod' in SETTINGS; there are void", value["text"])
+
+    def test_started_by_hand_it_says_what_it_is(self):
+        run = subprocess.run(python(SCORER), env={**os.environ, "PYTHONPATH": PACKAGE}, capture_output=True, text=True)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("plug is a plugin: the host starts it", run.stderr)
+
+    def test_a_class_of_no_kind_or_of_two_is_refused(self):
+        for body in ("    pass", "    def score(self, photo, view): ...\n    def detect(self, comparison, host): ..."):
+            run = subprocess.run(python(HEAD + body + "\nmain(Plug)\n"), env={**os.environ, "PYTHONPATH": PACKAGE},
+                                 capture_output=True, text=True)
+            self.assertIn("Plug needs score, search, detect or estimate, found", run.stderr)
+
+
+class AMatcherThatSearches(unittest.TestCase):
+    def test_services_answer_as_the_world_does(self):
+        world = toy.street(40, 30)
+        world.scene.add_descriptor(toy.banner())
+        with started('''
+    def search(self, photo, host):
+        from resurvey_plugin import toy
+        world, pose = toy.street(40, 30), photo.prior.pose
+        world.scene.add_descriptor(toy.banner())
+        poses = [pose, pose._replace(easting_m=pose.easting_m + 1), pose._replace(yaw_rad=0.1)]
+        for ours, theirs in zip(host.render(poses, stride=2), world.render(poses, 2)):
+            assert all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in zip(ours[:5], theirs[:5]))
+            assert ours.feature_table["fid"].tolist() == [1] and ours.feature_table["class"].tolist() == [toy.BANNER]
+        world.photo(pose)
+        same = dict(ignored_in_view=[toy.SKY], ignored_in_photo=[toy.OTHERS])
+        assert np.array_equal(host.compare_views(poses, **same), world.compare_views(poses, **same))
+        rays = host.pixel_rays(pose, [[20, 15], [1, 1]])
+        assert np.array_equal(rays, world.pixel_rays(pose, [[20, 15], [1, 1]]))
+        hits = host.cast_rays(pose.position, rays)
+        assert hits["hit"].tolist() == [1, 0] and np.allclose(host.project(pose, hits["point"][:1]), [[20, 15]])
+        assert host.cast_rays(pose.position, rays, limit_m=1.0)["hit"].tolist() == [0, 0]
+        assert host.inside_solid([pose.position] * 3).tolist() == [False] * 3
+        (fid, near), = host.descriptors_near(toy.banner().corners[0], 2.0)
+        assert fid == 1 and near.class_index == toy.BANNER and np.array_equal(near.corners, toy.banner().corners)
+        assert host.ground_height(pose.position) == 4.0
+        try:
+            host.grid_from_wgs84((22.3, 114.2, 5.0))
+        except Failed as failure:
+            host.log(str(failure), "warning")
+        assert host.classes[5].name == "chair" and host.classes[5].size_m[2] == 0.9 and host.slots == 9
+        host.progress(0.5)
+        return Localization(pose, 0.75, np.diag([1, 1, 0.01]), runner_up=RunnerUp(3.0, 0.5), candidates=3,
+                            heat=np.array([[pose.easting_m, pose.northing_m, 0.75]] * 100000))
+''', world) as host:
+            name, answer = host.search(world.photo(toy.POSE))
+            self.assertEqual(name, "done", answer)
+            self.assertEqual(answer["localization"], {
+                "pose": list(toy.POSE), "score": 0.75, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 0.01]],
+                "candidates": 3, "skipped": 0, "runner_up": {"distance_m": 3.0, "score_ratio": 0.5}})
+            self.assertEqual(host.noted, [
+                ("log", {"level": "warning", "text": "the toy host does not offer grid_from_wgs84"}), ("progress", 0.5)])
+            self.assertEqual(len(host.taken), 100_000)
+            self.assertEqual(host.taken[-1], [*toy.POSE[:2], 0.75])
+
+    def test_many_rows_go_in_as_many_messages_as_the_scratch_needs(self):
+        with started('''
+    def search(self, photo, host):
+        pixels = np.random.default_rng(1).uniform(0, 30, (200_000, 2))
+        rays = host.pixel_rays(photo.prior.pose, pixels)
+        assert np.allclose(host.project(photo.prior.pose, photo.prior.pose.position + rays), pixels)
+        return Localization(photo.prior.pose, 1.0, np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertEqual(host.search(host.world.photo(toy.POSE))[0], "done")
+
+    def test_numbers_that_json_does_not_have_become_null(self):
+        with started('''
+    def search(self, photo, host):
+        return Localization(photo.prior.pose, float("nan"), np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertIsNone(host.search(host.world.photo(toy.POSE))[1]["localization"]["score"])
+
+    def test_a_cancel_is_answered(self):
+        with started('''
+    def search(self, photo, host):
+        while True:
+            host.check_cancelled()
+''', toy.street(40, 30)) as host:
+            host.memory[8] = 1
+            self.assertEqual(host.search(host.world.photo(toy.POSE)), ("cancelled", {}))
+
+
+class DetectorAndEstimator(unittest.TestCase):
+    def test_regions_arrive_with_their_masks(self):
+        world = toy.street(80, 60)
+        photo = world.photo(toy.POSE).labels.copy()
+        photo[10:14, 20:27] = toy.BANNER
+        photo[11, 21] = 255
+        with started('''
+    def detect(self, comparison, host):
+        different = (comparison.photo != comparison.view.labels) & (comparison.photo != 255)
+        return [Region.of(different, comparison.view.labels[different][0], comparison.photo[different][0])] * 1200
+''', world) as host:
+            self.assertEqual(host.detect(photo, toy.POSE), ("done", {}))
+            self.assertEqual(len(host.taken), 1200)
+            last = host.taken[-1]
+            self.assertEqual((last["class_after"], last["bounds"], last["pixels"]), (toy.BANNER, [20, 10, 27, 14], 27))
+            self.assertEqual(host.read(last["mask"]).tolist(), (photo[10:14, 20:27] == toy.BANNER).astype(int).tolist())
+
+    def test_proposals_of_every_sort_arrive(self):
+        world = toy.street(80, 60)
+        mask = np.zeros((60, 80), bool)
+        mask[10:14, 20:27] = True
+        region = Region.of(mask, toy.STONE, toy.BANNER)
+        with started('''
+    def estimate(self, comparison, regions, host):
+        region, = regions
+        points = comparison.view.points[region.rows_and_columns]
+        assert region.mask.all() and points.shape == (4, 7, 3) and comparison.estimate.pose.height_m == 5.6
+        corners = comparison.view.origin + points[[-1, -1, 0, 0], [0, -1, -1, 0]]
+        return [Place(0, MaterialDescriptor(region.class_after, corners, [0, -1, 0], sigma=(0.25, 0.125, None))),
+                Place(0, DynamicDescriptor(5, corners[0], [0.5, 0.5, 0.9], yaw_rad=1.25)),
+                Remove(0, 5, corners[0], 0.5), Reject(0, "within-range", 61.5, 50.0, "m")]
+''', world) as host:
+            self.assertEqual(host.estimate(world.view(toy.POSE).labels, toy.POSE, [region]), ("done", {}))
+            material, dynamic, remove, reject = host.taken
+            self.assertEqual(material["place"]["descriptor"]["material"]["sigma"], [0.25, 0.125, None])
+            corner = material["place"]["descriptor"]["material"]["corners"][0]
+            self.assertAlmostEqual(corner[1], toy.POSE.northing_m + 10.0, places=3)
+            self.assertEqual(dynamic["place"]["descriptor"]["dynamic"], {
+                "class": 5, "position": corner, "size_m": [0.5, 0.5, 0.9], "yaw_rad": 1.25, "sigma": None})
+            self.assertEqual(remove, {"remove": {"region": 0, "class": 5, "near": corner, "sigma_m": 0.5}})
+            self.assertEqual(reject["reject"], {
+                "region": 0, "class_before": toy.STONE, "class_after": toy.BANNER, "pixels": 28,
+                "requirement": "within-range", "measured": 61.5, "limit": 50.0, "unit": "m"})
+
+    def test_a_call_without_results_sends_none(self):
+        world = toy.street(40, 30)
+        with started("    def estimate(self, comparison, regions, host):\n        return []\n", world) as host:
+            self.assertEqual(host.estimate(world.view(toy.POSE).labels, toy.POSE, []), ("done", {}))
+            self.assertEqual(host.taken, [])
+
+
+class TheOneFile(unittest.TestCase):
+    def build(self, directory, source):
+        path = os.path.join(directory, "plug.py")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(source)
+        return subprocess.run([sys.executable, "-m", "resurvey_plugin", "build", path], capture_output=True, text=True,
+                              env={**os.environ, "PYTHONPATH": PACKAGE})
+
+    def test_it_runs_alone_and_declares_itself_before_it_runs(self):
+        source = SCORER.replace("\nmain(", "\nif __name__ == '__main__':\n    main(")
+        with tempfile.TemporaryDirectory() as directory:
+            run = self.build(directory, source)
+            self.assertEqual((run.returncode, run.stderr), (0, ""))
+            path = run.stdout.strip()
+            with open(path, "rb") as file:
+                first, second = file.readline(), file.readline()
+            self.assertEqual(first, b"#!/usr/bin/env python3\n")
+            declared = json.loads(second.removeprefix(b"# resurvey-plugin: "))
+            os.remove(os.path.join(directory, "plug.py"))
+            host = FakeHost([sys.executable, path], package=directory)
+            said = host.raw()[1]
+            self.assertEqual({key: said[key] for key in declared}, declared)
+            self.assertEqual(host.create({"void": 255}), ("done", {}))
+            host.close()
+
+    def test_the_same_source_gives_the_same_bytes(self):
+        source, files = SCORER.replace("main(Plug)", ""), []
+        for _ in range(2):
+            with tempfile.TemporaryDirectory() as directory:
+                with open(self.build(directory, source).stdout.strip(), "rb") as file:
+                    files.append(file.read())
+        self.assertEqual(files[0], files[1])
+
+    def test_a_file_without_a_plugin_is_refused(self):
+        with tempfile.TemporaryDirectory() as directory:
+            run = self.build(directory, "x = 1\n")
+            self.assertEqual(run.returncode, 1)
+            self.assertIn("expected one class made from Plugin, found none", run.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
