@@ -2,11 +2,13 @@
  *
  * A plugin is a shared library with ONE exported data symbol, an rsv_declaration. The host reads its first bytes from
  * the file before any code of the plugin runs, opens the library, calls `entry` once, and then the functions that entry
- * put into the table. plugins/fixtures/c/matcher.c is a whole matcher in 60 lines; docs/plugin-guide.md is the prose.
+ * put into the table. Whole plugins: plugins/fixtures/c/matcher.c in 60 lines, examples/c_detector/detector.c, and in
+ * C++ examples/cpp_matcher/matcher.cpp. plugins/README.md is the first hour, docs/plugin-guide.md the prose.
  *
  * Rules of the line
  *  1. Structs that begin with `size` may grow at their end. Whoever makes one writes sizeof into `size`; whoever reads
- *     one looks at no field beyond `size`. What is not known reads as zero or null. All other structs are frozen.
+ *     one looks at no field beyond `size` (RSV_HAS asks). What is not known reads as zero or null. All other structs
+ *     are frozen.
  *  2. Whatever comes in is lent for the length of the call, and read-only unless it is named as a place for an answer.
  *     Keep no pointer to it. Nobody frees what the other side allocated.
  *  3. An instance is never called from two threads at once, but may move between threads. `create` may be called from
@@ -307,7 +309,7 @@ typedef struct rsv_proposal {
 typedef struct rsv_results {
   uint32_t size;
   uint32_t reserved;
-  void *context;
+  void *context; /* first argument of all three */
   rsv_status (*heat)(void *context, const double (*cells)[3], size_t count); /* easting m, northing m, score */
   rsv_status (*region)(void *context, const rsv_region *region);
   rsv_status (*proposal)(void *context, const rsv_proposal *proposal);
@@ -407,7 +409,9 @@ typedef struct rsv_header {
 typedef rsv_status (*rsv_entry)(const rsv_host_info *host, rsv_table *table, rsv_error *error);
 
 /* Export exactly one, under the name resurvey_plugin_v1__X, X any letters, digits and underscores of your own: two
- * plugins may be linked into one program. */
+ * plugins may be linked into one program. Build with -fvisibility=hidden, so that nothing else is exported. C++ keeps a
+ * const to its own file: declare it first, within extern "C":
+ *   RSV_EXPORT extern const rsv_declaration resurvey_plugin_v1__X; */
 typedef struct rsv_declaration {
   rsv_header header;
   rsv_entry entry;
@@ -421,6 +425,15 @@ typedef struct rsv_declaration {
     {'R', 'E', 'S', 'U', 'R', 'V', 'E', 'Y'}, RSV_ABI_MAJOR, RSV_ABI_MINOR, sizeof(rsv_declaration), 0, (kind_), 0,    \
     { 0 }                                                                                                              \
   }
+
+/* Whether the struct behind a pointer reaches as far as a field: that of an older host may end before it.
+ *   if (RSV_HAS(rsv_services, services, cast_rays) && services->cast_rays) ... */
+#define RSV_HAS(type_, pointer_, field_) ((pointer_)->size >= offsetof(type_, field_) + sizeof((pointer_)->field_))
+
+/* 1 when the host wants the call to end: return RSV_CANCELLED within 200 ms. 0 also where the host cannot say. */
+static inline uint32_t rsv_cancelled(const rsv_services *services) {
+  return RSV_HAS(rsv_services, services, cancelled) && services->cancelled ? services->cancelled(services->context) : 0;
+}
 
 /* Writes text to error, cut to fit, and gives RSV_FAILED: return rsv_fail(error, "no sky in the photo"); */
 static inline rsv_status rsv_fail(rsv_error *error, const char *text) {
