@@ -1,4 +1,4 @@
-//! `resurvey plugins install`: checks a library, copies it to the user's data directory and allows it.
+//! `resurvey plugins install`: checks a plugin file, copies it to the user's data directory and allows it.
 
 use super::check::{Checked, check};
 use super::installed::{Installed, Library, failure};
@@ -8,6 +8,7 @@ use crate::document;
 use crate::failure::{Failure, PLUGIN};
 use anyhow::anyhow;
 use resurvey_core::plugin::{Digest, PluginError, PluginInfo, Registry};
+use resurvey_schema::wire::EXECUTABLE_PREFIX;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -28,8 +29,10 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let installed = Installed::of_this_user()?;
     let sha256 = Digest::of(&bytes);
     let home = installed.plugins().join(sha256.to_string());
-    let copy = Copy::new(&installed.plugins(), &info, &bytes)?;
-    let checked = if options.no_check { None } else { Some(check(&copy.library, options.limits, console)?) };
+    let is_executable = Registry::is_executable(file);
+    let name = if is_executable { format!("{EXECUTABLE_PREFIX}{}", info.name) } else { library_name(&info.name) };
+    let copy = Copy::new(&installed.plugins(), &name, &bytes, is_executable)?;
+    let checked = if options.no_check { None } else { Some(check(&copy.file, options.limits, console)?) };
     if let Some(checked) = checked.as_ref().filter(|checked| checked.failed() > 0) {
         return not_installed(file, checked, console);
     }
@@ -38,8 +41,7 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let is_new = installed.allow(sha256, &format!("{} {}", info.name, info.version))? || !was_there;
     installed.forgive(sha256)?;
     let replaced = replace(&installed, &info.name, sha256)?;
-    let library = home.join(library_name(&info.name));
-    let info = PluginInfo { path: Some(library), sha256, ..info };
+    let info = PluginInfo { path: Some(home.join(name)), sha256, ..info };
     say(&info, is_new, &replaced, checked.as_ref(), console)?;
     Ok(0)
 }
@@ -101,23 +103,23 @@ fn say(
     console.line(format_args!("  {tests}; \"resurvey plugins remove {}\" takes it away", info.name))
 }
 
-/// A copy of a library beside its place, gone unless it is kept.
+/// A copy of a plugin file beside its place, gone unless it is kept.
 struct Copy {
     directory: tempfile::TempDir,
-    library: PathBuf,
+    file: PathBuf,
 }
 
 impl Copy {
-    fn new(plugins: &Path, info: &PluginInfo, bytes: &[u8]) -> Result<Self, Failure> {
+    fn new(plugins: &Path, name: &str, bytes: &[u8], is_executable: bool) -> Result<Self, Failure> {
         let make = || -> std::io::Result<Self> {
             std::fs::create_dir_all(plugins)?;
             let directory = tempfile::Builder::new().prefix(".new-").tempdir_in(plugins)?;
-            let library = directory.path().join(library_name(&info.name));
-            std::fs::write(&library, bytes)?;
+            let file = directory.path().join(name);
+            std::fs::write(&file, bytes)?;
             owned(directory.path(), 0o755)?;
-            owned(&library, 0o644)?;
-            std::fs::File::open(&library)?.sync_all()?;
-            Ok(Self { directory, library })
+            owned(&file, if is_executable { 0o755 } else { 0o644 })?;
+            std::fs::File::open(&file)?.sync_all()?;
+            Ok(Self { directory, file })
         };
         let copy = make().map_err(|error| failure(plugins, &error))?;
         // Who may write the directories above may put another file in its place.

@@ -144,6 +144,11 @@ impl Registry {
         Err(PluginError::Unknown { name: name.to_owned(), known })
     }
 
+    /// Whether the file at `path` is a program that speaks the wire, and no library; runs none of its code.
+    pub fn is_executable(path: &Path) -> bool {
+        read(path).and_then(|(path, bytes)| read_declaration(&path, &bytes)).is_ok_and(|found| found.is_executable())
+    }
+
     /// What the library at `path` says of itself, whether or not it may be loaded; runs no code of it.
     pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
         let found = read(path).and_then(|(path, bytes)| {
