@@ -1,6 +1,7 @@
 //! Arguments of `plugins`.
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
+use std::fmt;
 use std::path::PathBuf;
 
 /// `plugins` subcommands.
@@ -27,6 +28,10 @@ pub enum Plugins {
     /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; an older build of
     /// the same name is taken away.
     Install(Install),
+    /// Write a project for a plugin of your own, which builds and passes "plugins check"
+    ///
+    /// Writes a directory of its own and nothing else; one that is there already is left alone.
+    New(New),
     /// Take an installed plugin away, from the user's data directory and from allowed-plugins
     Remove {
         /// Name of the plugin, or SHA-256 of one build
@@ -71,6 +76,67 @@ pub struct Install {
     pub no_check: bool,
     #[command(flatten)]
     pub limits: Limits,
+}
+
+/// Arguments of `plugins new`.
+#[derive(Debug, Args)]
+pub struct New {
+    /// Name of the plugin: a-z and 0-9, words joined by dashes, such as facade-edges
+    pub name: String,
+    /// What it replaces: the search for the pose, the search for changes, or the measuring
+    #[arg(long, value_enum)]
+    pub kind: NewKind,
+    /// Its language
+    #[arg(long, value_enum)]
+    pub lang: Language,
+    /// Directory to write; default: NAME in the working directory
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Where the Rust SDK is: a checkout of resurvey, or the URL of its repository; default: where this program was built
+    #[arg(long, value_name = "DIR|URL")]
+    pub sdk: Option<String>,
+}
+
+/// Kinds of plugin that can be begun.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum NewKind {
+    /// Scores how well a view fits the photo
+    Matcher,
+    /// Finds the regions in which photo and view differ
+    Detector,
+    /// Measures what came, and says what went
+    Estimator,
+}
+
+/// Languages of `plugins new`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Language {
+    /// A crate with the SDK, without unsafe
+    Rust,
+    /// One file, the header, a Makefile
+    C,
+    /// A class on NumPy arrays; runs in a process of its own
+    Python,
+}
+
+impl fmt::Display for NewKind {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Matcher => "matcher",
+            Self::Detector => "detector",
+            Self::Estimator => "estimator",
+        })
+    }
+}
+
+impl fmt::Display for Language {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Rust => "rust",
+            Self::C => "c",
+            Self::Python => "python",
+        })
+    }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

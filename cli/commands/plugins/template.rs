@@ -1,0 +1,160 @@
+//! The files of `plugins/templates`, and what stands in them for a project.
+
+use crate::args::{Language, NewKind};
+
+/// What is to be written.
+pub struct Project<'a> {
+    /// Name of the plugin.
+    pub name: &'a str,
+    /// Its kind.
+    pub kind: NewKind,
+    /// Its language.
+    pub language: Language,
+    /// In Rust: the dependency on the SDK, as `Cargo.toml` says it.
+    pub sdk: Option<String>,
+}
+
+macro_rules! template {
+    ($path:literal) => {
+        include_str!(concat!("../../../plugins/templates/", $path))
+    };
+}
+
+macro_rules! package {
+    ($($file:literal),*) => {
+        [$((concat!("resurvey_plugin/", $file), include_str!(concat!("../../../plugins/python/resurvey_plugin/", $file)))),*]
+    };
+}
+
+/// The Python package goes with the project: it is on no registry, and speaks the wire of this very host.
+const PACKAGE: [(&str, &str); 10] = package![
+    "__init__.py",
+    "__main__.py",
+    "build.py",
+    "host.py",
+    "link.py",
+    "plugin.py",
+    "records.py",
+    "serve.py",
+    "toy.py",
+    "words.py"
+];
+
+/// Path and text of every file, paths relative to the project.
+pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
+    let kind = project.kind.to_string();
+    let (sources, verbatim): (Vec<(String, &str)>, &[(&str, &str)]) = match project.language {
+        Language::Rust => (rust(project.kind), &[]),
+        Language::C => {
+            (c(project.kind), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
+        }
+        Language::Python => (python(project.kind, &kind), &PACKAGE),
+    };
+    let written = sources.into_iter().map(|(path, text)| (path, filled_in(project, text)));
+    written.chain(verbatim.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned()))).collect()
+}
+
+/// The file to open first.
+pub fn main_file(project: &Project<'_>) -> String {
+    match project.language {
+        Language::Rust => "src/lib.rs".to_owned(),
+        Language::C => "plugin.c".to_owned(),
+        Language::Python => format!("{}.py", project.kind),
+    }
+}
+
+/// What to type next, in the directory of the project.
+pub fn steps(project: &Project<'_>) -> Vec<String> {
+    let (build, built) = match project.language {
+        Language::Rust => ("cargo build --release".to_owned(), format!("target/release/{}", library(project))),
+        Language::C => ("make".to_owned(), library(project)),
+        Language::Python => (
+            format!("python3 -m resurvey_plugin build {}.py", project.kind),
+            format!("resurvey-plugin-{}", project.name),
+        ),
+    };
+    vec![build, format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"), usage(project)]
+}
+
+fn rust(kind: NewKind) -> Vec<(String, &'static str)> {
+    let source = match kind {
+        NewKind::Matcher => template!("rust/matcher.rs"),
+        NewKind::Detector => template!("rust/detector.rs"),
+        NewKind::Estimator => template!("rust/estimator.rs"),
+    };
+    vec![
+        ("Cargo.toml".to_owned(), template!("rust/Cargo.toml.in")),
+        ("src/lib.rs".to_owned(), source),
+        ("README.md".to_owned(), template!("rust/README.md")),
+        (".gitignore".to_owned(), "/target\n"),
+    ]
+}
+
+fn c(kind: NewKind) -> Vec<(String, &'static str)> {
+    let source = match kind {
+        NewKind::Matcher => template!("c/matcher.c"),
+        NewKind::Detector => template!("c/detector.c"),
+        NewKind::Estimator => template!("c/estimator.c"),
+    };
+    vec![
+        ("plugin.c".to_owned(), source),
+        ("Makefile".to_owned(), template!("c/Makefile")),
+        ("README.md".to_owned(), template!("c/README.md")),
+        (".gitignore".to_owned(), "*.so\n"),
+    ]
+}
+
+fn python(kind: NewKind, name: &str) -> Vec<(String, &'static str)> {
+    let (source, test) = match kind {
+        NewKind::Matcher => (template!("python/matcher.py"), template!("python/test_matcher.py")),
+        NewKind::Detector => (template!("python/detector.py"), template!("python/test_detector.py")),
+        NewKind::Estimator => (template!("python/estimator.py"), template!("python/test_estimator.py")),
+    };
+    vec![
+        (format!("{name}.py"), source),
+        (format!("test_{name}.py"), test),
+        ("README.md".to_owned(), template!("python/README.md")),
+        (".gitignore".to_owned(), "__pycache__/\nresurvey-plugin-*\n"),
+    ]
+}
+
+/// Puts the project's words in place of the template's.
+fn filled_in(project: &Project<'_>, text: &str) -> String {
+    let placeholder = format!("My{}", capital(&project.kind.to_string()));
+    text.replace("my-plugin", project.name)
+        .replace("my_plugin", &project.name.replace('-', "_"))
+        .replace(&placeholder, &type_name(project))
+        .replace("@KIND@", &project.kind.to_string())
+        .replace("@USE@", &usage(project))
+        .replace("@SDK@", &format!("resurvey-plugin = {}", project.sdk.as_deref().unwrap_or_default()))
+}
+
+/// `facade-edges` of a matcher becomes `FacadeEdgesMatcher`: never a name that the SDK has.
+fn type_name(project: &Project<'_>) -> String {
+    let kind = capital(&project.kind.to_string());
+    let name: String = project.name.split('-').map(capital).collect();
+    match name.strip_suffix(&kind) {
+        Some("") => format!("My{kind}"),
+        Some(_) => name,
+        None => format!("{name}{kind}"),
+    }
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map(|first| first.to_ascii_uppercase().to_string() + letters.as_str()).unwrap_or_default()
+}
+
+fn library(project: &Project<'_>) -> String {
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    format!("{prefix}{}{suffix}", project.name.replace('-', "_"))
+}
+
+fn usage(project: &Project<'_>) -> String {
+    let (command, kind) = match project.kind {
+        NewKind::Matcher => ("localize", "matcher"),
+        NewKind::Detector => ("update", "detector"),
+        NewKind::Estimator => ("update", "estimator"),
+    };
+    format!("resurvey {command} city.rsv capture.json --{kind} {}", project.name)
+}
