@@ -46,7 +46,7 @@ pub fn copy(map: &Path, directory: &Path) -> PathBuf {
 
 /// What all tests share and none changes.
 pub struct Jobs {
-    /// `import`, `update`, `apply`, `revert` and `gc`.
+    /// `import`, `update`, `apply`, `revert`, `gc`, and `apply` to a map of format 2.
     pub all: Vec<Job>,
     /// A map with everything that a map can have.
     pub eventful: PathBuf,
@@ -91,6 +91,10 @@ pub fn jobs() -> &'static Jobs {
         ok("update", &[capture, "--pose", pose, "--propose"]);
         let eventful = now("eventful.rsv");
         all.push(Job::new("gc", &["--forget-before", "head"], eventful.clone()));
+        // The first command that writes to a map of an older format migrates it before.
+        let older = place.path("format-2.rsv");
+        fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/map-format-2.rsv"), &older).unwrap();
+        all.push(Job::new("apply", &[chair_set], older));
         Jobs { all, eventful, chair, _place: place }
     })
 }
