@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Colon-separated directories of plugin libraries.
 const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
-/// The file in the user's data directory with a line for every crash of a library: what crashed twice is not started again.
+/// The file in the user's data directory with a line for every crash of a plugin: what crashed twice is not started again.
 pub const CRASHED: &str = "crashed-plugins";
 
 /// Names in `--set NAME.KEY=VALUE` that are not plugins.

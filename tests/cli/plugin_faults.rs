@@ -223,13 +223,25 @@ fn two_crashes_quarantine_the_file_until_they_are_forgotten() {
     let ran = trial.localize("fine", "call", &[]);
     assert!([0, 22].contains(&ran.code), "one crash is not enough: {}", ran.err);
     trial.ended(&trial.localize("abort", "create", &[]), &["crashed in create"]);
-    let words = [
-        "refused libfaults.so at quarantine: its process crashed 2 times, in score and create",
-        "resurvey plugins remove faults",
-    ];
+    let remove = format!("resurvey plugins remove {}", trial.sha256);
+    let words = ["refused libfaults.so at quarantine: its process crashed 2 times, in score and create", &remove];
     trial.ended(&trial.localize("fine", "call", &[]), &words);
-    trial.forget_crashes();
-    assert!([0, 22].contains(&trial.localize("fine", "call", &[]).code));
+    for words in [
+        &["plugins", "remove", &trial.sha256][..],
+        &["plugins", "install", "--no-check", text(&trial.bench.path("plugins/libfaults.so"))],
+    ] {
+        let trusted = Command::new(env!("CARGO_BIN_EXE_resurvey"))
+            .args(words)
+            .env("XDG_DATA_HOME", trial.bench.path("data"))
+            .output()
+            .unwrap();
+        assert!(trusted.status.success(), "{}", String::from_utf8_lossy(&trusted.stderr));
+        let ran = trial.localize("fine", "call", &[]);
+        assert!([0, 22].contains(&ran.code), "{}", ran.err);
+        trial.localize("segv", "call", &[]);
+        trial.localize("segv", "call", &[]);
+        trial.ended(&trial.localize("fine", "call", &[]), &["at quarantine"]);
+    }
 }
 
 #[test]

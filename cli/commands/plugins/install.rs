@@ -39,7 +39,6 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let was_there = home.is_dir();
     copy.keep(&home)?;
     let is_new = installed.allow(sha256, &format!("{} {}", info.name, info.version))? || !was_there;
-    installed.forgive(sha256)?;
     let replaced = replace(&installed, &info.name, sha256)?;
     let info = PluginInfo { path: Some(home.join(name)), sha256, ..info };
     say(&info, is_new, &replaced, checked.as_ref(), console)?;

@@ -57,8 +57,9 @@ impl Installed {
         all
     }
 
-    /// Puts `sha256` on the list, with `remark`; gives whether it was not there.
+    /// Puts `sha256` on the list, with `remark`, and forgets its crashes; gives whether it was not there.
     pub fn allow(&self, sha256: Digest, remark: &str) -> Result<bool, Failure> {
+        self.forget_crashes(sha256)?;
         let mut lines = self.lines()?;
         if lines.iter().any(|line| digest_of(line) == Some(sha256)) {
             return Ok(false);
@@ -67,18 +68,18 @@ impl Installed {
         self.write(&lines).map(|()| true)
     }
 
-    /// Takes `sha256` off the list; gives whether it was there.
+    /// Takes `sha256` off the list, and its crashes out of their log; gives whether it was in either.
     pub fn forbid(&self, sha256: Digest) -> Result<bool, Failure> {
+        let has_crashed = self.forget_crashes(sha256)?;
         let lines = self.lines()?;
         let kept: Vec<String> = lines.iter().filter(|line| digest_of(line) != Some(sha256)).cloned().collect();
         if kept.len() == lines.len() {
-            return Ok(false);
+            return Ok(has_crashed);
         }
         self.write(&kept).map(|()| true)
     }
 
-    /// Forgets that `sha256` ever crashed.
-    pub fn forgive(&self, sha256: Digest) -> Result<(), Failure> {
+    fn forget_crashes(&self, sha256: Digest) -> Result<bool, Failure> {
         let log = self.data.join(CRASHED);
         CrashLog::new(&log).forget(sha256).map_err(|error| failure(&log, &error))
     }

@@ -23,7 +23,6 @@ pub fn run(which: &str, console: &mut Console<'_>) -> Result<u8, Failure> {
     removed.extend(digest.filter(|_| meant.is_empty()));
     for sha256 in &removed {
         was_there |= installed.forbid(*sha256)?;
-        installed.forgive(*sha256)?;
     }
     for library in &meant {
         std::fs::remove_dir_all(&library.directory).map_err(|error| failure(&library.directory, &error))?;

@@ -38,31 +38,31 @@ impl CrashLog {
     }
 
     /// Refuses a file that crashed too often, with what to do.
-    pub(super) fn check(&self, sha256: Digest, plugin: &str) -> Result<(), Fault> {
+    pub(super) fn check(&self, sha256: Digest) -> Result<(), Fault> {
         let crashes = self.crashes(sha256);
         if crashes.len() < MOST_CRASHES {
             return Ok(());
         }
         let calls = crashes.join(" and ");
         let advice = format!(
-            "remove it with \"resurvey plugins remove {plugin}\", or trust it again with \"resurvey plugins install FILE\""
+            "\"resurvey plugins remove {sha256}\" takes it away, \"resurvey plugins install FILE\" trusts it again"
         );
         let reason = format!("its process crashed {} times, in {calls}", crashes.len());
         Err((Stage::Quarantine, reason, advice))
     }
 
-    /// Forgets the crashes of a file: its user has decided to trust it again, or has removed it.
-    pub fn forget(&self, sha256: Digest) -> io::Result<()> {
-        let text = match std::fs::read_to_string(&self.path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(error),
-        };
+    /// Forgets the crashes of a file, because its user trusts it again or has removed it; gives whether there were any.
+    pub fn forget(&self, sha256: Digest) -> io::Result<bool> {
+        if self.crashes(sha256).is_empty() {
+            return Ok(false);
+        }
+        let text = std::fs::read_to_string(&self.path)?;
         let digest = sha256.to_string();
         let kept = text.lines().filter(|line| !line.starts_with(&digest));
         let beside = self.path.with_extension("new");
         std::fs::write(&beside, kept.map(|line| format!("{line}\n")).collect::<String>())?;
-        std::fs::rename(&beside, &self.path)
+        std::fs::rename(&beside, &self.path)?;
+        Ok(true)
     }
 
     /// Adds a crash.
@@ -87,14 +87,14 @@ mod tests {
         let log = CrashLog::new(&directory.path().join("data/crashed-plugins"));
         let (one, other) = (Digest::of(b"one"), Digest::of(b"other"));
         assert!(log.crashes(one).is_empty());
-        log.forget(one).unwrap();
+        assert!(!log.forget(one).unwrap());
         log.record(one, "agreement", "score").unwrap();
         log.record(other, "agreement", "create").unwrap();
         assert!(!log.is_quarantined(one));
         log.record(one, "agreement", "destroy").unwrap();
         assert_eq!(log.crashes(one), ["score", "destroy"]);
         assert!(log.is_quarantined(one) && !log.is_quarantined(other));
-        log.forget(one).unwrap();
+        assert!(log.forget(one).unwrap());
         assert_eq!((log.crashes(one).len(), log.crashes(other)), (0, vec!["create".to_owned()]));
     }
 }

@@ -90,7 +90,7 @@ impl Registry {
         };
         let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
         let quarantine = self.isolation.as_ref().and_then(|isolation| isolation.crashes.as_ref());
-        if let Some(Err(fault)) = quarantine.map(|log| log.check(info.sha256, &info.name)) {
+        if let Some(Err(fault)) = quarantine.map(|log| log.check(info.sha256)) {
             return self.skip(path, name, fault);
         }
         let first = match (self.builtins.contains_key(&info.name), self.found.get(&info.name)) {

@@ -143,7 +143,7 @@ impl Program {
 
     fn refuse_quarantined(&self) -> Result<(), PluginError> {
         let Some(log) = &self.isolation.crashes else { return Ok(()) };
-        log.check(self.sha256, &self.declared.name).map_err(|fault| self.refused(fault))
+        log.check(self.sha256).map_err(|fault| self.refused(fault))
     }
 
     fn check_hello(&self, hello: &Hello) -> Result<(), Fault> {
