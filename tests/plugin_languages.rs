@@ -2,6 +2,9 @@
 //! language that `plugins new` writes, and the examples, all through the built binary. A tool that a language needs and is
 //! not here skips its tests, and says so.
 
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may fail loudly")]
+
 #[path = "../examples/synthetic/mod.rs"]
 mod synthetic;
 #[path = "plugin_languages/toys.rs"]

@@ -2,6 +2,9 @@
 
 use crate::args::{Language, NewKind};
 
+/// Paths relative to the project, and texts before the project's words are put in.
+type Sources = Vec<(String, &'static str)>;
+
 /// What is to be written.
 pub struct Project<'a> {
     /// Name of the plugin.
@@ -43,7 +46,7 @@ const PACKAGE: [(&str, &str); 10] = package![
 /// Path and text of every file, paths relative to the project.
 pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
     let kind = project.kind.to_string();
-    let (sources, verbatim): (Vec<(String, &str)>, &[(&str, &str)]) = match project.language {
+    let (sources, verbatim): (Sources, &[(&str, &str)]) = match project.language {
         Language::Rust => (rust(project.kind), &[]),
         Language::C => {
             (c(project.kind), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
@@ -76,7 +79,7 @@ pub fn steps(project: &Project<'_>) -> Vec<String> {
     vec![build, format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"), usage(project)]
 }
 
-fn rust(kind: NewKind) -> Vec<(String, &'static str)> {
+fn rust(kind: NewKind) -> Sources {
     let source = match kind {
         NewKind::Matcher => template!("rust/matcher.rs"),
         NewKind::Detector => template!("rust/detector.rs"),
@@ -90,7 +93,7 @@ fn rust(kind: NewKind) -> Vec<(String, &'static str)> {
     ]
 }
 
-fn c(kind: NewKind) -> Vec<(String, &'static str)> {
+fn c(kind: NewKind) -> Sources {
     let source = match kind {
         NewKind::Matcher => template!("c/matcher.c"),
         NewKind::Detector => template!("c/detector.c"),
@@ -104,7 +107,7 @@ fn c(kind: NewKind) -> Vec<(String, &'static str)> {
     ]
 }
 
-fn python(kind: NewKind, name: &str) -> Vec<(String, &'static str)> {
+fn python(kind: NewKind, name: &str) -> Sources {
     let (source, test) = match kind {
         NewKind::Matcher => (template!("python/matcher.py"), template!("python/test_matcher.py")),
         NewKind::Detector => (template!("python/detector.py"), template!("python/test_detector.py")),
