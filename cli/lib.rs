@@ -6,6 +6,7 @@ mod commands;
 mod console;
 mod document;
 mod failure;
+mod matching;
 mod prior;
 mod region;
 mod report;

@@ -3,10 +3,12 @@
 use crate::args::{PluginSearch, Settings};
 use crate::commands::plugins::installed::{ALLOWED, directories};
 use crate::failure::Failure;
+use crate::matching::with_members;
 use anyhow::anyhow;
-use resurvey_core::localize::{GATE_KEYS, GateLimits, SearchLimits};
+use resurvey_core::localize::{FUSED, GATE_KEYS, GateLimits, SearchLimits};
 use resurvey_core::plugin::{Assignment, CrashLog, Digest, Isolation, Plugin, PluginError, PluginInfo, Registry};
 use resurvey_core::version::{ModelFile, PluginUse, SearchRange};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -34,6 +36,9 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
     for declaration in [
         resurvey_semantic::plugin(),
         resurvey_skyline::plugin(),
+        resurvey_pixel::plugin(),
+        resurvey_silhouette::plugin(),
+        resurvey_edges::plugin(),
         resurvey_class_difference::plugin(),
         resurvey_aligned::plugin(),
         resurvey_descriptors::plugin(),
@@ -103,13 +108,16 @@ impl Choices {
             gate: GateLimits::default(),
             search: SearchLimits::default(),
         };
-        for text in &settings.set {
-            let assignment: Assignment =
-                text.parse().map_err(|error| Failure::usage(format!("--set {text}: {error}")))?;
+        let parsed = |text: &String| -> Result<Assignment, Failure> {
+            text.parse().map_err(|error| Failure::usage(format!("--set {text}: {error}")))
+        };
+        let assignments = settings.set.iter().map(parsed).collect::<Result<Vec<_>, _>>()?;
+        let names = with_members(names, &assignments)?;
+        for (text, assignment) in settings.set.iter().zip(assignments) {
             match assignment.plugin.as_str() {
                 GATE => choices.set_gate(&assignment)?,
                 SEARCH => choices.set_search(&assignment)?,
-                name if names.contains(&name) => choices.assignments.push(assignment),
+                name if names.iter().any(|known| known == name) => choices.assignments.push(assignment),
                 name => {
                     let used = names.join(", ");
                     return Err(Failure::usage(format!(
@@ -121,16 +129,30 @@ impl Choices {
         Ok(choices)
     }
 
+    /// What a run was recorded with: every setting spelt out.
+    pub fn recorded(plugins: &[PluginUse]) -> Self {
+        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let settings = plugins.iter().flat_map(|used| {
+            let settings = used.settings.as_object().into_iter().flatten();
+            settings.map(|(key, value)| (used.name.clone(), key.clone(), text(value)))
+        });
+        Self {
+            assignments: settings.map(|(plugin, key, value)| Assignment { plugin, key, value }).collect(),
+            profile: None,
+            gate: GateLimits::default(),
+            search: SearchLimits::default(),
+        }
+    }
+
     /// How the evidence records how far the search goes.
     pub fn search_range(&self) -> SearchRange {
         SearchRange { radius_m: self.search.radius_m, yaw_range_deg: self.search.yaw_range_deg }
     }
 
-    /// Makes `plugin`, a matcher of this run, score every candidate at full size.
-    pub fn exhaustive(&mut self, plugin: &Plugin) -> Result<(), Failure> {
+    /// Makes the matcher called `name` score every candidate at full size.
+    pub fn exhaustive(&mut self, registry: &Registry, name: &str) -> Result<(), Failure> {
         const KEY: &str = "exhaustive";
-        let name = &plugin.info().name;
-        if !plugin.schema().iter().any(|(key, _)| key == KEY) {
+        if name == FUSED || !load(registry, name)?.schema().iter().any(|(key, _)| key == KEY) {
             return Err(Failure::usage(format!(
                 "--exhaustive: the matcher {name:?} has no such search; --matcher semantic has"
             )));
@@ -169,12 +191,15 @@ impl Choices {
         Ok(())
     }
 
+    /// What was set of the plugin called `name`: key and value.
+    pub fn given(&self, name: &str) -> Vec<(&str, &str)> {
+        let own = self.assignments.iter().filter(|assignment| assignment.plugin == name);
+        own.map(|assignment| (assignment.key.as_str(), assignment.value.as_str())).collect()
+    }
+
     /// `plugin` with its settings, and how the evidence records it.
     pub fn tool(&self, plugin: &Plugin) -> Result<Tool, Failure> {
-        let info = plugin.info();
-        let own = self.assignments.iter().filter(|assignment| assignment.plugin == info.name);
-        let mut given: Vec<(&str, &str)> =
-            own.map(|assignment| (assignment.key.as_str(), assignment.value.as_str())).collect();
+        let mut given = self.given(&plugin.info().name);
         if let Some(profile) = &self.profile
             && plugin.schema().iter().any(|(key, _)| key == "profile")
             && !given.iter().any(|(key, _)| *key == "profile")
@@ -201,6 +226,11 @@ pub struct Tool {
 }
 
 impl Tool {
+    /// Name and settings: what makes two tools give the same answers.
+    pub fn identity(&self) -> (&str, Digest) {
+        (&self.plugin.info().name, self.settings.sha256())
+    }
+
     /// How the evidence records it.
     pub fn used(&self) -> Result<PluginUse, Failure> {
         let info: &PluginInfo = self.plugin.info();

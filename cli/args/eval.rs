@@ -18,7 +18,8 @@ pub struct Eval {
     #[arg(long, value_name = "DIR")]
     pub maps: Vec<PathBuf>,
     /// A matcher with settings of its own, e.g. semantic:profile=paper,dice=1; "prior" is the phone's pose itself. May be
-    /// given again; default: prior, skyline, Dice, Jaccard and boundary F1 alone, the mean of the three, semantic
+    /// given again; default: prior, skyline, silhouette, edges, pixel, fused,
+    /// Dice, Jaccard and boundary F1 alone, the mean of the three, semantic
     #[arg(long, value_name = "NAME[:KEY=VALUE,…]")]
     pub matcher: Vec<String>,
     /// Also detect, estimate and commit, on copies of the maps, and score the changes

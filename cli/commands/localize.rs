@@ -5,8 +5,9 @@ use crate::args::{Localize, PluginSearch};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, UNRELIABLE};
+use crate::matching::MatchingTool;
 use crate::prior::{Placed, read_placed};
-use crate::tools::{Choices, load, registry};
+use crate::tools::{Choices, registry};
 use resurvey_core::capture::read_pose;
 use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
 use resurvey_core::store::{History, MapFile};
@@ -17,13 +18,11 @@ use std::path::Path;
 /// Finds the pose of a capture. Exit code 0 when it is reliable, 22 when it is not.
 pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     let registry = registry(plugins)?;
-    let plugin = load(&registry, &options.matcher)?;
     let mut choices = Choices::read(&options.settings, &[&options.matcher])?;
     if options.exhaustive {
-        choices.exhaustive(&plugin)?;
+        choices.exhaustive(&registry, &options.matcher)?;
     }
-    let tool = choices.tool(&plugin)?;
-    let mut matcher = tool.plugin.matcher(&tool.settings)?;
+    let mut matcher = MatchingTool::load(&registry, &choices, &options.matcher)?.matching()?;
     let map = MapFile::open_read_only(&options.map)?;
     let snapshot = map.snapshot(map.resolve(&options.at)?)?;
     let crs = crs_of(&map)?;

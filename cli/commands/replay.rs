@@ -6,7 +6,8 @@ use crate::args::{PluginSearch, Replay};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, MISSING, PLUGIN};
-use crate::tools::{self, Tool, registry};
+use crate::matching::MatchingTool;
+use crate::tools::{self, Choices, Tool, registry};
 use anyhow::anyhow;
 use resurvey_core::camera::{Camera, world_from_camera};
 use resurvey_core::capture::Capture;
@@ -56,7 +57,7 @@ fn evidence(map: &MapFile, version: VersionId) -> Result<RecordedObservation, Fa
 /// The recorded plugins, as they are to be had now.
 struct Tools {
     /// `None` where the pose was given.
-    matcher: Option<Tool>,
+    matcher: Option<MatchingTool>,
     detector: Tool,
     estimator: Tool,
     builds: Vec<Value>,
@@ -64,58 +65,47 @@ struct Tools {
 
 impl Tools {
     fn load(recorded: &RecordedObservation, registry: &Registry, any_build: bool) -> Result<Self, Failure> {
-        let mut builds = Vec::new();
-        let mut load = |kind: &str| -> Result<Option<Tool>, Failure> {
-            let Some(used) = recorded.observation.plugins.iter().find(|used| used.kind == kind) else {
-                return Ok(None);
-            };
-            let plugin = tools::load(registry, &used.name)?;
-            let info = plugin.info();
-            let is_same = used.sha256.is_none_or(|sha256| sha256 == info.sha256);
-            if !is_same && !any_build {
-                let (name, expected) = (&used.name, used.sha256.map(|digest| digest.to_string()).unwrap_or_default());
-                return Err(Failure::new(
-                    PLUGIN,
-                    anyhow!(
-                        "{kind} {name}: expected the recorded build {expected} (version {}), found {} (version {}); install that \
-                     build, or compare with this one: --any-build",
-                        used.version,
-                        info.sha256,
-                        info.version
-                    ),
-                ));
-            }
-            builds.push(json!({
-                "kind": kind, "name": used.name, "sha256": used.sha256.map(|digest| digest.to_string()),
-                "found_sha256": info.sha256.to_string(), "same": is_same,
-            }));
-            let given = values(used);
-            let settings = plugin.settings(given.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
-            let tool = Tool { plugin, settings };
-            if tool.used()?.files != used.files && !any_build {
-                let text = format!(
-                    "{kind} {}: the files that its settings name are not those of the record; find them, or \
-                    compare with these: --any-build",
-                    used.name
-                );
-                return Err(Failure::new(PLUGIN, anyhow!(text)));
-            }
-            Ok(Some(tool))
-        };
-        let matcher = load("matcher")?;
-        let (detector, estimator) = (load("detector")?, load("estimator")?);
-        let (Some(detector), Some(estimator)) = (detector, estimator) else {
+        let plugins = &recorded.observation.plugins;
+        let choices = Choices::recorded(plugins);
+        let named = |kind: &str| plugins.iter().find(|used| used.kind == kind).map(|used| used.name.as_str());
+        let (Some(detector), Some(estimator)) = (named("detector"), named("estimator")) else {
             let id = recorded.id;
             return Err(Failure::new(MISSING, anyhow!("observation {id} names no detector and estimator to replay")));
         };
+        let matcher = named("matcher").map(|name| MatchingTool::load(registry, &choices, name)).transpose()?;
+        let [detector, estimator] =
+            [detector, estimator].map(|name| tools::load(registry, name).and_then(|plugin| choices.tool(&plugin)));
+        let (detector, estimator) = (detector?, estimator?);
+        let mut found = matcher.as_ref().map(MatchingTool::used).transpose()?.unwrap_or_default();
+        found.extend([detector.used()?, estimator.used()?]);
+        let builds = plugins.iter().map(|used| build(used, &found, any_build)).collect::<Result<_, _>>()?;
         Ok(Self { matcher, detector, estimator, builds })
     }
 }
 
-/// Recorded settings as the command line would give them.
-fn values(used: &PluginUse) -> Vec<(String, String)> {
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    used.settings.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), text(value))).collect()
+/// Whether what was `used` is among what is `found` now.
+fn build(used: &PluginUse, found: &[PluginUse], any_build: bool) -> Result<Value, Failure> {
+    let (kind, name) = (&used.kind, &used.name);
+    let now = found.iter().find(|now| now.kind == *kind && now.name == *name);
+    let sha256 = |used: &PluginUse| used.sha256.map(|digest| digest.to_string());
+    let is_same =
+        now.is_some_and(|now| (used.sha256.is_none() || used.sha256 == now.sha256) && used.files == now.files);
+    if !is_same && !any_build {
+        let text = |used: &PluginUse| format!("{} (version {})", sha256(used).unwrap_or_default(), used.version);
+        let of_files = if now.is_some_and(|now| now.files != used.files) { ", or with other files" } else { "" };
+        return Err(Failure::new(
+            PLUGIN,
+            anyhow!(
+                "{kind} {name}: expected the recorded build {}, found {}{of_files}; install that build, or compare with this \
+             one: --any-build",
+                text(used),
+                now.map_or_else(|| "none".to_owned(), text)
+            ),
+        ));
+    }
+    Ok(json!({
+        "kind": kind, "name": name, "sha256": sha256(used), "found_sha256": now.and_then(sha256), "same": is_same,
+    }))
 }
 
 /// What was seen: out of the map, or from the file whose digest was recorded.
@@ -193,7 +183,7 @@ fn replay(
                 radius_m: range.radius_m,
                 yaw_range_deg: range.yaw_range_deg,
             });
-            let mut matcher = matcher.plugin.matcher(&matcher.settings)?;
+            let mut matcher = matcher.matching()?;
             localize(&mut matcher, &services, &GateLimits::default(), &search)?
         }
     };

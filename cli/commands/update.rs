@@ -7,14 +7,15 @@ use crate::commands::review::{Review, repeated};
 use crate::console::{Console, Stage};
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
+use crate::matching::MatchingTool;
 use crate::prior::{Placed, read_placed};
 use crate::report::{Reports, Seen, Sheet};
 use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, GivenPose, read_given_pose};
 use resurvey_core::crs::Crs;
-use resurvey_core::localize::{GateLimits, Located, SceneServices, World, localize};
-use resurvey_core::plugin::{Detector, Estimator, Matcher, PluginInfo};
+use resurvey_core::localize::{GateLimits, Located, Matching, SceneServices, World, localize};
+use resurvey_core::plugin::{Detector, Estimator, Kind, PluginInfo};
 use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::{History, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
@@ -99,7 +100,7 @@ fn refuse_one_for_several(options: &Update) -> Result<(), Failure> {
 /// The three plugins of one run.
 struct Tools {
     choices: Choices,
-    matcher: Matcher,
+    matcher: Matching,
     comparers: Comparers,
 }
 
@@ -117,13 +118,16 @@ impl Tools {
         let names = [options.matcher.as_str(), options.detector.as_str(), options.estimator.as_str()];
         let choices = Choices::read(&options.settings, &names)?;
         let load = |name: &str| -> Result<Tool, Failure> { choices.tool(&tools::load(&registry, name)?) };
-        let [matcher, detector, estimator] = [load(names[0])?, load(names[1])?, load(names[2])?];
+        let matcher = MatchingTool::load(&registry, &choices, names[0])?;
+        let [detector, estimator] = [load(names[1])?, load(names[2])?];
+        let mut used = matcher.used()?;
+        used.extend([detector.used()?, estimator.used()?]);
         Ok(Self {
-            matcher: matcher.plugin.matcher(&matcher.settings)?,
+            matcher: matcher.matching()?,
             comparers: Comparers {
                 detector: detector.plugin.detector(&detector.settings)?,
                 estimator: estimator.plugin.estimator(&estimator.settings)?,
-                used: vec![matcher.used()?, detector.used()?, estimator.used()?],
+                used,
             },
             choices,
         })
@@ -348,7 +352,7 @@ impl Run<'_> {
         used: &[PluginUse],
         decision: Decision,
     ) -> Observation {
-        let localization = &outcome.located.localization;
+        let (localization, matcher) = (&outcome.located.localization, Kind::Matcher.to_string());
         Observation {
             capture: capture.digest,
             taken_at: capture.taken_at,
@@ -364,7 +368,7 @@ impl Run<'_> {
                 runner_up: localization.runner_up,
                 candidates: localization.candidates,
             }),
-            plugins: used.iter().skip(usize::from(is_given)).cloned().collect(),
+            plugins: used.iter().filter(|used| !is_given || used.kind != matcher).cloned().collect(),
             gates: outcome.located.gates.clone(),
             rejections: outcome.resolution.rejections.clone(),
             decision,

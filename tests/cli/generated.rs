@@ -11,6 +11,9 @@ fn the_built_in_plugins_are_listed_with_the_documented_keys() {
     for (name, kind) in [
         ("semantic", "matcher"),
         ("skyline", "matcher"),
+        ("pixel", "matcher"),
+        ("silhouette", "matcher"),
+        ("edges", "matcher"),
         ("class-difference", "detector"),
         ("aligned", "detector"),
         ("descriptors", "estimator"),

@@ -17,6 +17,7 @@ mod forgetting;
 mod generated;
 mod history;
 mod map_files;
+mod matchers;
 mod models;
 mod page;
 mod plugin_check;

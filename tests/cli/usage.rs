@@ -68,7 +68,12 @@ fn names_that_nothing_has_are_exit_11_and_the_known_ones_are_listed() {
     let capture = street().path("capture/capture.json");
     let capture = text(&capture);
     for command in ["localize", "update"] {
-        bench.refuses(command, &[capture, "--matcher", "magic"], 11, &["magic", "semantic, skyline"]);
+        bench.refuses(
+            command,
+            &[capture, "--matcher", "magic"],
+            11,
+            &["magic", "edges, pixel, semantic, silhouette, skyline"],
+        );
     }
     bench.refuses("update", &[capture, "--detector", "magic"], 11, &["class-difference"]);
     bench.refuses("update", &[capture, "--estimator", "magic"], 11, &["descriptors"]);

@@ -20,7 +20,7 @@ pub fn metadata() -> Value {
 }
 
 /// The arrows of `docs/architecture.md`: package, and the packages of this workspace that it is built from.
-pub const ARROWS: [(&str, &[&str]); 10] = [
+pub const ARROWS: [(&str, &[&str]); 13] = [
     (
         "resurvey",
         &[
@@ -28,8 +28,11 @@ pub const ARROWS: [(&str, &[&str]); 10] = [
             "resurvey-class-difference",
             "resurvey-core",
             "resurvey-descriptors",
+            "resurvey-edges",
+            "resurvey-pixel",
             "resurvey-schema",
             "resurvey-semantic",
+            "resurvey-silhouette",
             "resurvey-skyline",
         ],
     ),
@@ -41,6 +44,9 @@ pub const ARROWS: [(&str, &[&str]); 10] = [
     ("resurvey-plugin", &["resurvey-schema"]),
     ("resurvey-schema", &[]),
     ("resurvey-semantic", &["resurvey-plugin"]),
+    ("resurvey-edges", &["resurvey-plugin"]),
+    ("resurvey-pixel", &["resurvey-plugin"]),
+    ("resurvey-silhouette", &["resurvey-plugin"]),
     ("resurvey-skyline", &["resurvey-plugin"]),
 ];
 

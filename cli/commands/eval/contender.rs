@@ -2,16 +2,22 @@
 
 use crate::args::{Eval, PluginSearch, Settings};
 use crate::failure::Failure;
+use crate::matching::{MatchingTool, with_members};
 use crate::tools::{Choices, Tool, load, registry};
-use resurvey_core::plugin::{Digest, Registry};
+use resurvey_core::localize::FUSED;
+use resurvey_core::plugin::{Assignment, Digest, Registry};
 
 /// The phone's pose as the answer.
 const PRIOR: &str = "prior";
 
 /// What is compared when nothing is asked for: name in tables, and as `--matcher` has it.
-const DEFAULT: [(&str, &str); 7] = [
+const DEFAULT: [(&str, &str); 11] = [
     (PRIOR, PRIOR),
     ("skyline", "skyline"),
+    ("silhouette", "silhouette"),
+    ("edges", "edges"),
+    ("pixel", "pixel"),
+    (FUSED, FUSED),
     ("Dice", "semantic:profile=paper,dice=1,jaccard=0,boundary_f1=0"),
     ("Jaccard", "semantic:profile=paper,dice=0,jaccard=1,boundary_f1=0"),
     ("boundary F1", "semantic:profile=paper,dice=0,jaccard=0,boundary_f1=1"),
@@ -46,7 +52,7 @@ pub struct Field {
     /// Every combination, in the order of the tables: all of the first matcher first.
     pub contenders: Vec<Contender>,
     /// Matchers.
-    pub matchers: Vec<Entry<Option<Tool>>>,
+    pub matchers: Vec<Entry<Option<MatchingTool>>>,
     /// Detectors.
     pub detectors: Vec<Entry<Tool>>,
     /// Estimators.
@@ -65,7 +71,10 @@ impl Field {
             if options.matcher.is_empty() { DEFAULT.to_vec() } else { given.collect() };
         let matchers = specifications.iter().map(|(_, text)| plugin_name(text)).filter(|name| *name != PRIOR);
         let others = options.detector.iter().chain(&options.estimator).map(|text| plugin_name(text));
-        let names: Vec<String> = matchers.chain(others).map(ToOwned::to_owned).collect();
+        let mut names: Vec<String> = matchers.chain(others).map(ToOwned::to_owned).collect();
+        for (_, text) in &specifications {
+            names.extend(members(&options.settings, text)?);
+        }
         let settings = Settings { set: options.settings.set.clone(), profile: options.settings.profile.clone() };
         let reading = Reading { registry: &registry, settings: &settings, names: &names };
         let matchers = specifications.iter().map(|(name, text)| reading.matcher(name, text));
@@ -114,9 +123,9 @@ impl Field {
     }
 
     fn identity(&self, contender: &Contender) -> [Option<(&str, Digest)>; 3] {
-        let [detector, estimator] = self.comparers(contender).map(Some);
-        [self.matchers[contender.matcher].tool.as_ref(), detector, estimator]
-            .map(|tool| tool.map(|tool| (tool.plugin.info().name.as_str(), tool.settings.sha256())))
+        let matcher = self.matchers[contender.matcher].tool.as_ref().map(MatchingTool::identity);
+        let [detector, estimator] = self.comparers(contender).map(|tool| Some(tool.identity()));
+        [matcher, detector, estimator]
     }
 
     /// Limits of gate and search, and the settings of detector and estimator.
@@ -151,7 +160,7 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn matcher(&self, name: &str, text: &str) -> Result<Entry<Option<Tool>>, Failure> {
+    fn matcher(&self, name: &str, text: &str) -> Result<Entry<Option<MatchingTool>>, Failure> {
         const OPTION: &str = "--matcher";
         if plugin_name(text) == PRIOR {
             if !own_settings(OPTION, text)?.is_empty() {
@@ -159,9 +168,10 @@ impl Reading<'_> {
             }
             return Ok(Entry { name: name.to_owned(), specification: text.to_owned(), tool: None });
         }
-        let entry = self.entry(OPTION, text)?;
-        entry.tool.plugin.matcher(&entry.tool.settings)?;
-        Ok(Entry { name: name.to_owned(), specification: entry.specification, tool: Some(entry.tool) })
+        let choices = choices(self.settings, self.names, &own_settings(OPTION, text)?)?;
+        let tool = MatchingTool::load(self.registry, &choices, plugin_name(text))?;
+        tool.matching()?;
+        Ok(Entry { name: name.to_owned(), specification: text.to_owned(), tool: Some(tool) })
     }
 
     /// The plugin that `text` names, with the settings of the run, overruled by its own.
@@ -177,6 +187,17 @@ fn choices(settings: &Settings, names: &[String], own: &[String]) -> Result<Choi
     let set = settings.set.iter().chain(own).cloned().collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     Choices::read(&Settings { set, profile: settings.profile.clone() }, &names)
+}
+
+/// The matchers that one is made of, where `specification` names several.
+fn members(settings: &Settings, specification: &str) -> Result<Vec<String>, Failure> {
+    if plugin_name(specification) != FUSED {
+        return Ok(Vec::new());
+    }
+    let own = own_settings("--matcher", specification)?;
+    let parsed = |text: &String| text.parse::<Assignment>().map_err(Failure::usage);
+    let assignments = settings.set.iter().chain(&own).map(parsed).collect::<Result<Vec<_>, _>>()?;
+    with_members(&[FUSED], &assignments)
 }
 
 fn plugin_name(specification: &str) -> &str {

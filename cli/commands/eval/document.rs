@@ -7,6 +7,7 @@ use super::judge::Update;
 use super::run::Results;
 use crate::document::{change, plugin_use, rejection};
 use crate::failure::Failure;
+use crate::matching::MatchingTool;
 use crate::tools::Tool;
 use resurvey_core::evaluate::{ChangeScore, Difference, PoseError, Summary, Trial};
 use resurvey_core::update::Change;
@@ -34,9 +35,15 @@ pub fn document(results: &Results<'_>, groups: &[Group]) -> Result<Value, Failur
     }))
 }
 
-fn matcher(entry: &Entry<Option<Tool>>) -> Result<Value, Failure> {
-    let plugin = entry.tool.as_ref().map(|tool| Ok::<_, Failure>(plugin_use(&tool.used()?))).transpose()?;
-    Ok(json!({ "name": entry.name, "specification": entry.specification, "plugin": plugin }))
+fn matcher(entry: &Entry<Option<MatchingTool>>) -> Result<Value, Failure> {
+    let used = entry.tool.as_ref().map_or(Ok(Vec::new()), MatchingTool::used)?;
+    let mut used = used.iter().map(plugin_use);
+    let mut document = json!({ "name": entry.name, "specification": entry.specification, "plugin": used.next() });
+    let members: Vec<Value> = used.collect();
+    if !members.is_empty() {
+        document["members"] = json!(members);
+    }
+    Ok(document)
 }
 
 /// What a contender is called and made of; detector and estimator are null where nothing is updated.

@@ -8,6 +8,7 @@ use crate::commands::crs_of;
 use crate::commands::update::{Comparers, Outcome, Recording, Run, Work};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::matching::MatchingTool;
 use crate::tools::Tool;
 use resurvey_core::evaluate::{ChangeScore, SecondPhoto, score_changes, score_second_photo};
 use resurvey_core::localize::Located;
@@ -64,7 +65,7 @@ pub struct Judge<'a> {
     /// Detector and estimator.
     pub comparers: [&'a Tool; 2],
     /// The matcher, for the evidence.
-    pub matcher: Option<&'a Tool>,
+    pub matcher: Option<&'a MatchingTool>,
 }
 
 impl Judge<'_> {
@@ -152,11 +153,12 @@ impl Judge<'_> {
     /// Detects, estimates and commits. What was found is committed, or it is an error.
     fn conclude(&self, map: &MapFile, work: &Work, located: Located) -> Result<Outcome, Failure> {
         let [detector, estimator] = self.comparers;
-        let tools = self.matcher.into_iter().chain(self.comparers);
+        let mut used = self.matcher.map_or(Ok(Vec::new()), MatchingTool::used)?;
+        used.extend([detector.used()?, estimator.used()?]);
         let mut comparers = Comparers {
             detector: detector.plugin.detector(&detector.settings)?,
             estimator: estimator.plugin.estimator(&estimator.settings)?,
-            used: tools.map(Tool::used).collect::<Result<_, _>>()?,
+            used,
         };
         let (outcome, _) = quietly(|console| run_on(map)?.conclude(work, located, false, &mut comparers, console))?;
         Ok(outcome)

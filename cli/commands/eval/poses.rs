@@ -4,7 +4,8 @@ use super::progress::Portion;
 use crate::commands::crs_of;
 use crate::commands::update::Work;
 use crate::failure::Failure;
-use crate::tools::{Choices, Tool};
+use crate::matching::MatchingTool;
+use crate::tools::Choices;
 use resurvey_core::capture::Capture;
 use resurvey_core::localize::{Located, SceneServices, localize};
 use resurvey_core::store::MapFile;
@@ -22,7 +23,7 @@ pub enum Photo {
 
 /// What one matcher answered to the photos of one case.
 pub struct Poses<'a> {
-    matcher: Option<&'a Tool>,
+    matcher: Option<&'a MatchingTool>,
     choices: &'a Choices,
     portion: &'a Portion<'a>,
     known: Vec<Known>,
@@ -37,7 +38,7 @@ struct Known {
 
 impl<'a> Poses<'a> {
     /// None yet.
-    pub fn new(matcher: Option<&'a Tool>, choices: &'a Choices, portion: &'a Portion<'a>) -> Self {
+    pub fn new(matcher: Option<&'a MatchingTool>, choices: &'a Choices, portion: &'a Portion<'a>) -> Self {
         Self { matcher, choices, portion, known: Vec::new() }
     }
 
@@ -56,7 +57,7 @@ impl<'a> Poses<'a> {
         let Choices { gate, search, .. } = self.choices;
         let Some(tool) = self.matcher else { return Ok(Located::new(as_answer(&work.capture), gate)) };
         // A new instance each time: what one capture did to it is nothing to the next.
-        let mut matcher = tool.plugin.matcher(&tool.settings)?;
+        let mut matcher = tool.matching()?;
         let services = SceneServices::new(&work.world, &work.capture, crs_of(map)?, self.portion);
         Ok(localize(&mut matcher, &services, gate, search)?)
     }

@@ -1,9 +1,11 @@
 //! One capture, one matcher, one answer with its doubt.
 
+use super::fused::Matching;
 use super::gate::{GateLimits, reason};
+use super::panel::Panel;
 use super::search::{SearchLimits, search};
 use super::services::SceneServices;
-use crate::plugin::{Matcher, MatcherForm, PhotoInput, PluginError, Services};
+use crate::plugin::{MatcherForm, PhotoInput, PluginError, Services};
 use crate::version::Gate;
 use resurvey_schema::Localization;
 
@@ -32,9 +34,9 @@ impl Located {
     }
 }
 
-/// The pose of the capture that `services` are about, by `matcher` in either form.
+/// The pose of the capture that `services` are about, by a matcher in either form or by several.
 pub fn localize(
-    matcher: &mut Matcher,
+    matching: &mut Matching,
     services: &SceneServices<'_>,
     limits: &GateLimits,
     search_limits: &SearchLimits,
@@ -42,9 +44,12 @@ pub fn localize(
     let capture = services.capture();
     let camera = capture.camera.intrinsics();
     let photo = PhotoInput { labels: &capture.labels, camera: &camera, prior: &capture.prior };
-    let localization = match matcher.form() {
-        MatcherForm::Search => matcher.search(services, &photo)?,
-        MatcherForm::Score => search(matcher, services, search_limits)?,
+    let localization = match matching {
+        Matching::Plugin(matcher) => match matcher.form() {
+            MatcherForm::Search => matcher.search(services, &photo)?,
+            MatcherForm::Score => search(&mut Panel::of_one(matcher), services, search_limits)?,
+        },
+        Matching::Fused(fused) => search(&mut fused.panel(), services, search_limits)?,
     };
     services.progress(1.0);
     Ok(Located::new(localization, limits))

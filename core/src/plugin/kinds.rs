@@ -6,13 +6,16 @@ use super::info::PluginInfo;
 use super::input::{ComparisonInput, PhotoInput, ViewImages};
 use super::instance::Instance;
 use super::open::{Code, Plugin};
-use super::process::{Apart, MakeView};
+use super::process::Apart;
 use super::services::Services;
 use super::settings::Settings;
 use super::{lend, line};
 use crate::image::LabelImage;
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::{ChangeRegion, Localization, Proposal};
+
+/// Hands the view of this index to its second argument.
+pub type MakeView<'a> = dyn FnMut(usize, &mut dyn FnMut(&ViewImages<'_>)) + 'a;
 
 /// Who drives the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

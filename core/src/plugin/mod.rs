@@ -35,7 +35,7 @@ pub use error::{PluginError, Refusal, Stage};
 pub use info::{Digest, InvalidDigest, Kind, PluginInfo};
 pub use input::{ComparisonInput, PhotoInput, ViewImages};
 pub use isolation::Isolation;
-pub use kinds::{Detector, Estimator, Matcher, MatcherForm};
+pub use kinds::{Detector, Estimator, MakeView, Matcher, MatcherForm};
 pub use open::Plugin;
 pub use process::{SERVE, serve};
 pub use registry::{Registry, SkippedFile};

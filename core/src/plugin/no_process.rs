@@ -5,7 +5,7 @@ use super::error::{PluginError, Refusal, Stage};
 use super::info::Digest;
 use super::input::{ComparisonInput, PhotoInput, ViewImages};
 use super::isolation::Isolation;
-use super::kinds::MatcherForm;
+use super::kinds::{MakeView, MatcherForm};
 use super::open::Plugin;
 use super::services::Services;
 use super::settings::{Settings, SettingsSchema};
@@ -22,9 +22,6 @@ pub const SERVE: &str = "serve-plugin";
 pub fn serve(_: impl IntoIterator<Item = OsString>) -> u8 {
     1
 }
-
-/// Hands view `index` to its second argument, once.
-pub(super) type MakeView<'a> = dyn FnMut(usize, &mut dyn FnMut(&ViewImages<'_>)) + 'a;
 
 /// Nothing is compared where nothing is started.
 #[derive(Clone, Debug)]

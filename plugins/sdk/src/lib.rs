@@ -10,6 +10,7 @@ mod abi_host;
 mod borrow;
 mod call;
 mod caught;
+pub mod class_list;
 mod deliver;
 #[doc(hidden)]
 pub mod export;
@@ -19,6 +20,7 @@ pub mod kinds;
 pub mod score;
 pub mod toy;
 
+pub use class_list::ClassList;
 pub use host::Host;
 pub use image::{Comparison, ImageRef, View, ViewImages};
 pub use kinds::{Detector, Error, Estimator, Photo, Plugin, Scorer, Searcher};

@@ -5,6 +5,7 @@ mod camera;
 mod host;
 pub mod noise;
 mod scene;
+pub mod trial;
 
 pub use camera::ToyCamera;
 pub use host::{ToyCapture, ToyHost};

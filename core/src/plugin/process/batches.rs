@@ -7,6 +7,7 @@ use crate::image::LabelImage;
 use crate::plugin::check;
 use crate::plugin::error::PluginError;
 use crate::plugin::input::ViewImages;
+use crate::plugin::kinds::MakeView;
 use crate::plugin::lend;
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{Array, Dtype, ScoreCall, ToPlugin, WireViews};
@@ -17,9 +18,6 @@ const BATCH_BYTES: usize = 1 << 20;
 const MOST_VIEWS: usize = 64;
 /// Batches that are filled or scored at a time.
 const HALVES: usize = 2;
-
-/// Hands view `index` to its second argument, once.
-pub(in super::super) type MakeView<'a> = dyn FnMut(usize, &mut dyn FnMut(&ViewImages<'_>)) + 'a;
 
 impl Apart {
     /// Scores of `count` views against `photo`, in order.

@@ -20,7 +20,6 @@ mod wire;
 use super::isolation::Isolation;
 
 pub(super) use apart::Apart;
-pub(super) use batches::MakeView;
 pub use child::SERVE;
 pub(super) use fingerprint::Fingerprint;
 pub(super) use program::Program;
