@@ -85,7 +85,7 @@ fn an_update_at_the_true_pose_places_the_banner_with_the_documented_keys() {
     let off_m = (0..2).map(|i| (after["centre"][i].as_f64().unwrap() - truth[i]).powi(2)).sum::<f64>().sqrt();
     assert!(off_m < 0.5, "the banner is {off_m:.2} m off in plan");
     for plugin in document["plugins"].as_array().unwrap() {
-        assert_eq!(keys(plugin), ["kind", "name", "version", "sha256", "settings"]);
+        assert_eq!(keys(plugin), ["kind", "name", "version", "sha256", "settings", "settings_sha256", "files"]);
     }
     assert_eq!(bench.head(), 2);
 }
