@@ -53,10 +53,11 @@ typedef int32_t rsv_status;
 #define RSV_CANCELLED 3   /* ended early because the host asked for it */
 #define RSV_UNSUPPORTED 4 /* the callee does not do this, or not for these arguments */
 
-/* Kinds of plugin. 4 and 5 are kept for segmenters (photo to labels) and positioners (a better prior). */
+/* Kinds of plugin. 5 is kept for positioners (a better prior). */
 #define RSV_KIND_MATCHER 1
 #define RSV_KIND_DETECTOR 2
 #define RSV_KIND_ESTIMATOR 3
+#define RSV_KIND_SEGMENTER 4
 
 /* ---- frozen records ------------------------------------------------------------------------------------------------ */
 
@@ -74,6 +75,15 @@ typedef struct rsv_image {
   uint32_t height;
   size_t row_bytes;
 } rsv_image;
+
+/* A place of the host for one class per pixel, of the photo's size: 255 everywhere when the call begins. Write to the
+ * pixels alone: rows may be padded. */
+typedef struct rsv_labels {
+  uint8_t *data;
+  uint32_t width;
+  uint32_t height;
+  size_t row_bytes;
+} rsv_labels;
 
 typedef struct rsv_point {
   double easting_m, northing_m, height_m;
@@ -192,6 +202,13 @@ typedef struct rsv_photo {
   const rsv_camera *camera;
   const rsv_prior *prior;
 } rsv_photo;
+
+/* What a segmenter sees: the photo, upright and of the camera's size. */
+typedef struct rsv_picture {
+  uint32_t size;
+  uint32_t reserved;
+  rsv_image pixels; /* uint8_t[3]: red, green, blue (sRGB); row_bytes is a multiple of 3 */
+} rsv_picture;
 
 /* Photo and view of the same pose, of one size. */
 typedef struct rsv_comparison {
@@ -321,7 +338,9 @@ typedef void (*rsv_view_receiver)(void *receiver, size_t index, const rsv_view *
 typedef void (*rsv_feature_receiver)(void *receiver, uint64_t fid, const rsv_descriptor *descriptor);
 typedef void (*rsv_task)(void *task, size_t index);
 
-/* The photo and the camera are those of the call. A null function is a service that this host does not have. */
+/* The photo and the camera are those of the call. A null function is a service that this host does not have. A segmenter
+ * is called before anybody knows where the photo was taken: it has the class table, parallel_for, log, progress and
+ * cancelled; every other service returns RSV_FAILED. */
 typedef struct rsv_services {
   uint32_t size;
   uint32_t class_slots; /* one more than the highest class index: length of the counts of one view */
@@ -369,7 +388,8 @@ typedef struct rsv_services {
 typedef struct rsv_instance rsv_instance; /* yours alone: the host never looks into it */
 
 /* Filled by entry, into a place of the host that is zero but for `size`: leave `size` alone. A matcher needs score or
- * search (with both, the host searches), a detector detect, an estimator estimate; every plugin create and destroy. */
+ * search (with both, the host searches), a detector detect, an estimator estimate, a segmenter segment; every plugin create
+ * and destroy. */
 typedef struct rsv_table {
   uint32_t size;
   uint32_t reserved;
@@ -392,6 +412,9 @@ typedef struct rsv_table {
   rsv_status (*estimate)(rsv_instance *instance, const rsv_services *services, const rsv_comparison *comparison,
                          const rsv_region *regions, size_t region_count, size_t region_step,
                          const rsv_results *results, rsv_error *error);
+  /* Fills labels: each the index of a class of services->classes, or 255 where the pixel is none of them. */
+  rsv_status (*segment)(rsv_instance *instance, const rsv_services *services, const rsv_picture *picture,
+                        const rsv_labels *labels, rsv_error *error);
 } rsv_table;
 
 /* Frozen for every version of the line: 32 bytes without a pointer, read from the file. */

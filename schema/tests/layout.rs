@@ -31,6 +31,7 @@ fn records() -> Facts {
     let mut facts = Facts::new();
     facts!(facts, "rsv_text", abi::Text { data, length });
     facts!(facts, "rsv_image", abi::Image { data, width, height, row_bytes });
+    facts!(facts, "rsv_labels", abi::Labels { data, width, height, row_bytes });
     facts!(facts, "rsv_point", GridPoint { easting_m, northing_m, height_m });
     facts!(facts, "rsv_pose", Pose { position, yaw_rad, pitch_rad, roll_rad });
     facts!(facts, "rsv_wgs84", Wgs84 { latitude_deg, longitude_deg, ellipsoidal_height_m });
@@ -88,6 +89,7 @@ fn calls() -> Facts {
         abi::View { size, reserved, origin, labels, range_m, points, features, feature_table, feature_count }
     );
     facts!(facts, "rsv_photo", abi::Photo { size, reserved, labels, camera, prior });
+    facts!(facts, "rsv_picture", abi::Picture { size, reserved, pixels });
     facts!(facts, "rsv_comparison", abi::Comparison { size, reserved, photo, view, camera, estimate });
     facts!(facts, "rsv_render_request", abi::RenderRequest { size, stride, with_descriptors, reserved });
     facts!(
@@ -196,7 +198,7 @@ fn tables() -> Facts {
     facts!(
         facts,
         "rsv_table",
-        abi::Table { size, reserved, settings_schema, create, destroy, score, search, detect, estimate }
+        abi::Table { size, reserved, settings_schema, create, destroy, score, search, detect, estimate, segment }
     );
     facts!(
         facts,
@@ -219,6 +221,7 @@ fn constants() -> Facts {
         ("RSV_KIND_MATCHER", abi::KIND_MATCHER as usize),
         ("RSV_KIND_DETECTOR", abi::KIND_DETECTOR as usize),
         ("RSV_KIND_ESTIMATOR", abi::KIND_ESTIMATOR as usize),
+        ("RSV_KIND_SEGMENTER", abi::KIND_SEGMENTER as usize),
         ("RSV_MATERIAL", abi::Descriptor::MATERIAL as usize),
         ("RSV_DYNAMIC", abi::Descriptor::DYNAMIC as usize),
         ("RSV_HAS_YAW", abi::Descriptor::HAS_YAW as usize),

@@ -43,6 +43,36 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Decoded, ImageError> {
     }
 }
 
+/// Whether a file begins as a PNG does.
+pub(super) fn is_png(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x89, b'P', b'N', b'G'])
+}
+
+/// Width, height, and red, green and blue of each pixel of a PNG, whatever its form.
+pub(super) fn decode_png_colours(bytes: &[u8]) -> Result<(u32, u32, Vec<u8>), ImageError> {
+    let damaged = |error: png::DecodingError| ImageError::Damaged { format: "PNG", reason: error.to_string() };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: 1 << 29 });
+    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let header = decoder.read_header_info().map_err(damaged)?;
+    let (width, height) = (header.width, header.height);
+    check_size(width, height)?;
+    let mut reader = decoder.read_info().map_err(damaged)?;
+    let oversize = || ImageError::TooLarge { width, height, limit_px: MAX_PIXELS };
+    let mut values = vec![0; reader.output_buffer_size().ok_or_else(oversize)?];
+    let frame = reader.next_frame(&mut values).map_err(damaged)?;
+    reader.finish().map_err(damaged)?;
+    let colours = match frame.color_type {
+        png::ColorType::Rgb => values,
+        png::ColorType::Rgba => values.chunks_exact(4).flat_map(|colour| [colour[0], colour[1], colour[2]]).collect(),
+        png::ColorType::Grayscale => values.iter().flat_map(|grey| [*grey; 3]).collect(),
+        png::ColorType::GrayscaleAlpha => values.chunks_exact(2).flat_map(|grey| [grey[0]; 3]).collect(),
+        png::ColorType::Indexed => return Err(ImageError::PixelForm { found: "indices without a palette".to_owned() }),
+    };
+    Ok((width, height, colours))
+}
+
 fn decode_png(bytes: &[u8]) -> Result<Decoded, ImageError> {
     let damaged = |error: png::DecodingError| ImageError::Damaged { format: "PNG", reason: error.to_string() };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: 1 << 29 });

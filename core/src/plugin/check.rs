@@ -1,5 +1,6 @@
 //! What the host checks in every answer before anyone sees it.
 
+use crate::image::LabelImage;
 use resurvey_schema::{
     ChangeRegion, ClassId, ClassKind, ClassTable, Descriptor, GridPoint, Localization, Proposal, Uncertainty,
 };
@@ -53,6 +54,21 @@ fn not_negative(field: &str, value: f64) -> Checked {
 
 fn point(field: &str, point: GridPoint) -> Checked {
     finite(field, &<[f64; 3]>::from(point))
+}
+
+/// Every label is a class of the map, or void.
+pub(super) fn labels(labels: &LabelImage, classes: &ClassTable) -> Checked {
+    let mut is_known = [false; 256];
+    is_known[usize::from(ClassId::VOID.0)] = true;
+    classes.iter().for_each(|class| is_known[usize::from(class.index.0)] = true);
+    match labels.values().iter().position(|label| !is_known[usize::from(*label)]) {
+        None => Ok(()),
+        Some(at) => {
+            let width = labels.width() as usize;
+            let field = format!("labels[{}][{}]", at / width, at % width);
+            violation(field, &labels.values()[at], "a class of the map, or 255 for none")
+        }
+    }
 }
 
 pub(super) fn localization(found: &Localization) -> Checked {

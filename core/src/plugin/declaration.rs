@@ -138,7 +138,8 @@ fn read_texts(bytes: &[u8], symbol: &str) -> Result<Declared, Fault> {
     }
     let number = u16::from_ne_bytes([bytes[KIND_OFFSET], bytes[KIND_OFFSET + 1]]);
     let unknown_kind = || {
-        let reason = format!("plugin is of kind {number}, this host knows 1 (matcher), 2 (detector) and 3 (estimator)");
+        let known = "1 (matcher), 2 (detector), 3 (estimator) and 4 (segmenter)";
+        let reason = format!("plugin is of kind {number}, this host knows {known}");
         (Stage::Abi, reason, "upgrade resurvey".to_owned())
     };
     let mut header = [0; HEADER_BYTES];

@@ -47,9 +47,10 @@ fn declared(line: Line) -> Result<Declared, Fault> {
     if !allowed_name(&line.name) {
         return Err(fault(Stage::Header, format!("expected a name of a–z, 0–9 and dashes, found {:?}", line.name)));
     }
-    let kinds = [Kind::Matcher, Kind::Detector, Kind::Estimator];
+    let kinds = [Kind::Matcher, Kind::Detector, Kind::Estimator, Kind::Segmenter];
     let Some(kind) = kinds.into_iter().find(|kind| kind.to_string() == line.kind) else {
-        let reason = format!("plugin is of kind {:?}, this host knows matcher, detector and estimator", line.kind);
+        let known = "matcher, detector, estimator and segmenter";
+        let reason = format!("plugin is of kind {:?}, this host knows {known}", line.kind);
         return Err((Stage::Abi, reason, "upgrade resurvey".to_owned()));
     };
     let texts = [("version", &line.version), ("summary", &line.summary)];

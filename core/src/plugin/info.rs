@@ -38,6 +38,8 @@ pub enum Kind {
     Detector,
     /// Makes descriptors of these regions.
     Estimator,
+    /// Says which class each pixel of a photo is.
+    Segmenter,
 }
 
 impl Kind {
@@ -47,6 +49,7 @@ impl Kind {
             abi::KIND_MATCHER => Some(Self::Matcher),
             abi::KIND_DETECTOR => Some(Self::Detector),
             abi::KIND_ESTIMATOR => Some(Self::Estimator),
+            abi::KIND_SEGMENTER => Some(Self::Segmenter),
             _ => None,
         }
     }
@@ -58,6 +61,7 @@ impl std::fmt::Display for Kind {
             Self::Matcher => "matcher",
             Self::Detector => "detector",
             Self::Estimator => "estimator",
+            Self::Segmenter => "segmenter",
         })
     }
 }

@@ -28,27 +28,27 @@ pub enum MatcherForm {
 
 /// An instance, in this process or another.
 #[derive(Debug)]
-enum Body {
+pub(super) enum Body {
     Here(Box<Instance>),
     Apart(Box<Apart>),
 }
 
 impl Body {
-    fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
+    pub(super) fn create(plugin: Plugin, settings: &Settings) -> Result<Self, PluginError> {
         match plugin.code().clone() {
             Code::Here(table) => Ok(Self::Here(Box::new(Instance::create(plugin, table, settings)?))),
             Code::Apart(program) => Ok(Self::Apart(Box::new(Apart::create(plugin, program, settings)?))),
         }
     }
 
-    fn plugin(&self) -> &Plugin {
+    pub(super) fn plugin(&self) -> &Plugin {
         match self {
             Self::Here(instance) => instance.plugin(),
             Self::Apart(instance) => instance.plugin(),
         }
     }
 
-    fn finish(&mut self) -> Result<(), PluginError> {
+    pub(super) fn finish(&mut self) -> Result<(), PluginError> {
         match self {
             Self::Here(_) => Ok(()),
             Self::Apart(instance) => instance.finish(),

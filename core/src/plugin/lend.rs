@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::input::{ComparisonInput, ViewImages};
-use crate::image::Raster;
+use crate::image::{LabelImage, Raster};
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::service::{PoseEstimate, Prior, RayHit};
 use resurvey_schema::{CameraModel, ChangeRegion, ClassKind, ClassTable, Descriptor, Intrinsics};
@@ -109,6 +109,12 @@ pub(super) fn view_conflict((width, height): (u32, u32), view: &ViewImages<'_>) 
     ];
     let other = sizes.into_iter().find(|(_, w, h)| (*w, *h) != (width, height));
     other.map(|(name, w, h)| format!("photo is {width}×{height}, {name} of the view {w}×{h}"))
+}
+
+/// A place for a class per pixel.
+pub(super) fn labels(raster: &mut LabelImage) -> abi::Labels {
+    let (width, height) = (raster.width(), raster.height());
+    abi::Labels { data: raster.values_mut().as_mut_ptr(), width, height, row_bytes: width as usize }
 }
 
 pub(super) fn camera(camera: &Intrinsics) -> abi::Camera {

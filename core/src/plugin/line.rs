@@ -1,14 +1,16 @@
-//! The four calls of the C line, on structs that point to what the host lends. Every answer is checked here.
+//! The five calls of the C line, on structs that point to what the host lends. Every answer is checked here.
 #![allow(unsafe_code)]
 
 use super::check::{self, Rules};
 use super::error::PluginError;
 use super::instance::Instance;
+use super::lend;
 use super::results::{self, Collected, Collector};
 use super::service_table::ServiceTable;
 use super::services::Services;
+use crate::image::LabelImage;
 use resurvey_schema::abi::{self, Growing, STATUS_UNSUPPORTED, Status};
-use resurvey_schema::{ChangeRegion, Localization, Proposal};
+use resurvey_schema::{ChangeRegion, ClassId, Localization, Proposal};
 
 /// Similarity of photo and view, 0–1.
 ///
@@ -106,6 +108,28 @@ pub(super) unsafe fn estimate(
         }
     })?;
     Ok(collected.proposals)
+}
+
+/// The class of each pixel of `picture`.
+///
+/// # Safety
+/// As [`score`].
+pub(super) unsafe fn segment(
+    instance: &mut Instance,
+    services: &dyn Services,
+    picture: &abi::Picture,
+) -> Result<LabelImage, PluginError> {
+    let abi::Image { width, height, .. } = picture.pixels;
+    let mut labels = LabelImage::filled(width, height, ClassId::VOID.0);
+    let rules = Rules { classes: services.classes(), width, height, regions: 0 };
+    let place = lend::labels(&mut labels);
+    collect(instance, "segment", services, rules, |table, pointer, context, error| match table.segment {
+        // SAFETY: as in `score`; the place lives until the function returns, and nobody else uses it meanwhile.
+        Some(function) => unsafe { function(pointer, context.services, picture, &raw const place, error) },
+        None => STATUS_UNSUPPORTED,
+    })?;
+    check::labels(&labels, services.classes()).map_err(|violation| instance.invalid("segment", violation))?;
+    Ok(labels)
 }
 
 fn rules<'a>(services: &'a dyn Services, comparison: &abi::Comparison, regions: usize) -> Rules<'a> {

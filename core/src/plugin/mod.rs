@@ -1,8 +1,8 @@
-//! Plugin host: finds, loads and calls matchers, detectors and estimators through the C ABI. `docs/plugin-guide.md` has
-//! the rules of the line, `schema/include/resurvey_plugin.h` its words.
+//! Plugin host: finds, loads and calls matchers, detectors, estimators and segmenters through the C ABI.
+//! `docs/plugin-guide.md` has the rules of the line, `schema/include/resurvey_plugin.h` its words.
 //!
-//! The only `unsafe` of core is here, in `open`, `instance`, `kinds`, `line`, `lend`, `results`, `service_table`,
-//! `process`, and in `examine`, which tries what a plugin does with the memory it is lent.
+//! The only `unsafe` of core is here, in `open`, `instance`, `kinds`, `segmenter`, `line`, `lend`, `results`,
+//! `service_table`, `process`, and in `examine`, which tries what a plugin does with the memory it is lent.
 
 mod check;
 mod crashes;
@@ -25,6 +25,7 @@ mod process;
 mod process;
 mod registry;
 mod results;
+mod segmenter;
 mod service_table;
 mod services;
 mod settings;
@@ -39,5 +40,6 @@ pub use kinds::{Detector, Estimator, MakeView, Matcher, MatcherForm};
 pub use open::Plugin;
 pub use process::{SERVE, serve};
 pub use registry::{Registry, SkippedFile};
+pub use segmenter::Segmenter;
 pub use services::{ServiceError, Services, class_slots};
 pub use settings::{Assignment, Setting, Settings, SettingsError, SettingsSchema, ValueType};

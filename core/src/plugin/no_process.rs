@@ -9,7 +9,7 @@ use super::kinds::{MakeView, MatcherForm};
 use super::open::Plugin;
 use super::services::Services;
 use super::settings::{Settings, SettingsSchema};
-use crate::image::LabelImage;
+use crate::image::{LabelImage, RgbImage};
 use resurvey_schema::{ChangeRegion, Localization, Proposal};
 use std::ffi::OsString;
 use std::path::Path;
@@ -81,6 +81,10 @@ impl Apart {
     }
 
     pub(super) fn search(&mut self, _: &dyn Services, _: &PhotoInput<'_>) -> Result<Localization, PluginError> {
+        match *self {}
+    }
+
+    pub(super) fn segment(&mut self, _: &dyn Services, _: &RgbImage) -> Result<LabelImage, PluginError> {
         match *self {}
     }
 

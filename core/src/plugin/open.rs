@@ -9,6 +9,7 @@ use super::isolation::Isolation;
 use super::kinds::{Detector, Estimator, Matcher, MatcherForm};
 use super::lend;
 use super::process::{Fingerprint, Program};
+use super::segmenter::Segmenter;
 use super::settings::{Settings, SettingsSchema};
 use resurvey_schema::abi::{self, ABI_MAJOR, ABI_MINOR, Declaration, Growing, HEADER_BYTES, STATUS_OK, Table};
 use std::path::Path;
@@ -137,6 +138,11 @@ impl Plugin {
         Estimator::create(self.of_kind(Kind::Estimator)?, settings)
     }
 
+    /// An instance of a segmenter.
+    pub fn segmenter(&self, settings: &Settings) -> Result<Segmenter, PluginError> {
+        Segmenter::create(self.of_kind(Kind::Segmenter)?, settings)
+    }
+
     pub(super) fn code(&self) -> &Code {
         &self.0.code
     }
@@ -203,6 +209,7 @@ fn enter(declaration: &'static Declaration, kind: Kind) -> Result<(Table, String
         Kind::Matcher if table.score.is_none() && table.search.is_none() => Some("score or search"),
         Kind::Detector if table.detect.is_none() => Some("detect"),
         Kind::Estimator if table.estimate.is_none() => Some("estimate"),
+        Kind::Segmenter if table.segment.is_none() => Some("segment"),
         _ => None,
     };
     if let Some(function) = missing {

@@ -4,7 +4,7 @@ use crate::abi_host::AbiHost;
 use crate::borrow::{self, fill, growing, wrong};
 use crate::caught::caught;
 use crate::deliver;
-use crate::kinds::{Detector, Error, Estimator, Plugin, Scorer, Searcher};
+use crate::kinds::{Detector, Error, Estimator, Plugin, Scorer, Searcher, Segmenter};
 use resurvey_schema::abi::{
     self, ABI_MAJOR, ErrorText, Growing, HostInfo, Instance, STATUS_FAILED, STATUS_OK, STATUS_PANICKED, Status, Table,
     Text,
@@ -22,7 +22,7 @@ pub(crate) unsafe extern "C" fn enter_scorer<T: Scorer>(
     table: *mut Table,
     error: *mut ErrorText,
 ) -> Status {
-    // SAFETY: the host calls its entry as the header says; likewise in the three below.
+    // SAFETY: the host calls its entry as the header says; likewise in the four below.
     unsafe { enter::<T>(host, table, error, Table { score: Some(score::<T>), ..Table::new() }) }
 }
 
@@ -54,6 +54,16 @@ pub(crate) unsafe extern "C" fn enter_estimator<T: Estimator>(
 ) -> Status {
     // SAFETY: as in `enter_scorer`.
     unsafe { enter::<T>(host, table, error, Table { estimate: Some(estimate::<T>), ..Table::new() }) }
+}
+
+/// Fills the table of a segmenter.
+pub(crate) unsafe extern "C" fn enter_segmenter<T: Segmenter>(
+    host: *const HostInfo,
+    table: *mut Table,
+    error: *mut ErrorText,
+) -> Status {
+    // SAFETY: as in `enter_scorer`.
+    unsafe { enter::<T>(host, table, error, Table { segment: Some(segment::<T>), ..Table::new() }) }
 }
 
 /// # Safety
@@ -243,6 +253,26 @@ unsafe extern "C" fn estimate<T: Estimator>(
         let found = plugin.estimate(&host, &comparison, &regions)?;
         // SAFETY: as above.
         unsafe { deliver::proposals(results, &found) }
+    };
+    // SAFETY: the host calls as the header says.
+    unsafe { call(instance, error, body) }
+}
+
+unsafe extern "C" fn segment<T: Segmenter>(
+    instance: *mut Instance,
+    services: *const abi::Services,
+    picture: *const abi::Picture,
+    labels: *const abi::Labels,
+    error: *mut ErrorText,
+) -> Status {
+    let body = |plugin: &mut T| {
+        // SAFETY: the host lends services and picture for this call.
+        let (host, picture) = unsafe { (AbiHost::new(services)?, growing(picture)?) };
+        // SAFETY: as above: what a picture points to lives with it.
+        let photo = unsafe { borrow::image(&picture.pixels) }?;
+        let found = plugin.segment(&host, photo)?;
+        // SAFETY: the host lends the place for this call.
+        unsafe { deliver::labels(labels, (photo.width(), photo.height()), &found) }
     };
     // SAFETY: the host calls as the header says.
     unsafe { call(instance, error, body) }

@@ -65,6 +65,30 @@ pub(crate) unsafe fn proposals(results: *const abi::Results, proposals: &[Propos
     })
 }
 
+/// Writes labels, row by row, to the place of the host, which is `width` × `height`.
+///
+/// # Safety
+/// `to` is null or that of the call in progress.
+pub(crate) unsafe fn labels(to: *const abi::Labels, (width, height): (u32, u32), labels: &[u8]) -> Result<(), Error> {
+    // SAFETY: the caller's promise; the struct is frozen.
+    let Some(place) = (unsafe { to.as_ref() }) else { return wrong("the host handed in no place for the labels") };
+    let (columns, rows) = (width as usize, height as usize);
+    if labels.len() != columns * rows {
+        return Err(Error(format!("expected {width}×{height} labels, found {}", labels.len())));
+    }
+    if columns == 0 || rows == 0 {
+        return Ok(());
+    }
+    if place.data.is_null() || (place.width, place.height) != (width, height) || place.row_bytes < columns {
+        return wrong("the host handed in a place for labels of another size than the photo");
+    }
+    for (row, values) in labels.chunks_exact(columns).enumerate() {
+        // SAFETY: the host lends `height` rows of `width` writable bytes, `row_bytes` apart, to this call alone.
+        unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), place.data.add(row * place.row_bytes), columns) };
+    }
+    Ok(())
+}
+
 fn taken(status: abi::Status) -> Result<(), Error> {
     if status == STATUS_OK { Ok(()) } else { wrong("the host did not take the answer") }
 }

@@ -1,8 +1,8 @@
 //! The declaration of a plugin and the macros that export it.
 
 use crate::call;
-use crate::kinds::{Detector, Estimator, Plugin, Scorer, Searcher};
-use resurvey_schema::abi::{Declaration, EntryFn, KIND_DETECTOR, KIND_ESTIMATOR, KIND_MATCHER};
+use crate::kinds::{Detector, Estimator, Plugin, Scorer, Searcher, Segmenter};
+use resurvey_schema::abi::{Declaration, EntryFn, KIND_DETECTOR, KIND_ESTIMATOR, KIND_MATCHER, KIND_SEGMENTER};
 
 /// Exports a matcher in `score` form. See [`export_plugin`](crate::export_plugin).
 #[macro_export]
@@ -33,6 +33,14 @@ macro_rules! export_detector {
 macro_rules! export_estimator {
     ($plugin:ty) => {
         $crate::export_plugin!($crate::export::estimator::<$plugin>());
+    };
+}
+
+/// Exports a segmenter. See [`export_plugin`](crate::export_plugin).
+#[macro_export]
+macro_rules! export_segmenter {
+    ($plugin:ty) => {
+        $crate::export_plugin!($crate::export::segmenter::<$plugin>());
     };
 }
 
@@ -72,6 +80,11 @@ pub const fn detector<T: Detector>() -> Declaration {
 /// The declaration of a descriptor estimator.
 pub const fn estimator<T: Estimator>() -> Declaration {
     declare::<T>(KIND_ESTIMATOR, call::enter_estimator::<T>)
+}
+
+/// The declaration of a segmenter.
+pub const fn segmenter<T: Segmenter>() -> Declaration {
+    declare::<T>(KIND_SEGMENTER, call::enter_segmenter::<T>)
 }
 
 const fn declare<T: Plugin>(kind: u16, entry: EntryFn) -> Declaration {

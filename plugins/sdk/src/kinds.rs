@@ -75,3 +75,11 @@ pub trait Estimator: Plugin {
         regions: &[ChangeRegion],
     ) -> Result<Vec<Proposal>, Error>;
 }
+
+/// A segmenter.
+pub trait Segmenter: Plugin {
+    /// The class of each pixel of `photo` (red, green, blue; sRGB), row by row without padding: an index of
+    /// `host.classes()`, or 255 where it is none of them. Of the host, only the class table, `parallel_for`, `log`,
+    /// `progress` and `cancelled` are there: nobody knows yet where the photo was taken.
+    fn segment(&mut self, host: &dyn Host, photo: ImageRef<'_, [u8; 3]>) -> Result<Vec<u8>, Error>;
+}

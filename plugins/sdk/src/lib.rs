@@ -1,5 +1,5 @@
-//! Safe Rust SDK for resurvey plugins. Implement one of [`Scorer`], [`Searcher`], [`Detector`], [`Estimator`] and export
-//! it with one macro call; the macro writes the unsafe part, and `#![forbid(unsafe_code)]` still holds in the plugin.
+//! Safe Rust SDK for resurvey plugins. Implement one of [`Scorer`], [`Searcher`], [`Detector`], [`Estimator`],
+//! [`Segmenter`] and export it with one macro call; the macro writes the unsafe part, and `#![forbid(unsafe_code)]` still holds in the plugin.
 
 #[cfg(panic = "abort")]
 compile_error!(
@@ -23,7 +23,7 @@ pub mod toy;
 pub use class_list::ClassList;
 pub use host::Host;
 pub use image::{Comparison, ImageRef, View, ViewImages};
-pub use kinds::{Detector, Error, Estimator, Photo, Plugin, Scorer, Searcher};
+pub use kinds::{Detector, Error, Estimator, Photo, Plugin, Scorer, Searcher, Segmenter};
 pub use resurvey_schema as schema;
 pub use resurvey_schema::service::{
     ClassCounts, ClassSet, CompareRequest, Level, PanoramaRequest, PoseEstimate, Prior, RayHit, ViewCounts, ViewFeature,

@@ -115,6 +115,18 @@ pub struct Photo {
     pub prior: *const Prior,
 }
 
+/// What a segmenter sees.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct Picture {
+    /// Bytes of this struct.
+    pub size: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Three `u8`: red, green, blue (sRGB), upright and of the camera's size.
+    pub pixels: Image,
+}
+
 /// Photo and view of the same pose.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]

@@ -11,9 +11,11 @@ mod result;
 mod services;
 mod table;
 
-pub use call::{Camera, CompareRequest, Comparison, PanoramaRequest, Photo, PoseEstimate, Prior, RenderRequest, View};
+pub use call::{
+    Camera, CompareRequest, Comparison, PanoramaRequest, Photo, Picture, PoseEstimate, Prior, RenderRequest, View,
+};
 pub use declaration::{Declaration, ENTRY_OFFSET, EntryFn, HEADER_BYTES, Header, MAGIC, SYMBOL_FAMILY, SYMBOL_PREFIX};
-pub use record::{ClassRecord, Image, RayHit, Text};
+pub use record::{ClassRecord, Image, Labels, RayHit, Text};
 pub use result::{Descriptor, Localization, Proposal, Region, Results};
 pub use services::{FeatureReceiver, Services, Task, ViewReceiver};
 pub use table::{ErrorText, HostInfo, Instance, Table};
@@ -42,7 +44,7 @@ pub const KIND_MATCHER: u16 = 1;
 pub const KIND_DETECTOR: u16 = 2;
 /// Number of a descriptor estimator.
 pub const KIND_ESTIMATOR: u16 = 3;
-/// Number kept for segmenters: photo to labels.
+/// Number of a segmenter.
 pub const KIND_SEGMENTER: u16 = 4;
 /// Number kept for positioners: a better prior.
 pub const KIND_POSITIONER: u16 = 5;
@@ -74,6 +76,7 @@ growing!(
     Localization,
     PanoramaRequest,
     Photo,
+    Picture,
     PoseEstimate,
     Prior,
     Proposal,

@@ -34,6 +34,20 @@ pub struct Image {
     pub row_bytes: usize,
 }
 
+/// A place of the host for one class per pixel, top-left first; only the pixels are written.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct Labels {
+    /// First value of the first row.
+    pub data: *mut u8,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bytes from one row to the next, at least `width`.
+    pub row_bytes: usize,
+}
+
 /// A class of the map's table.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]

@@ -1,7 +1,7 @@
 //! The functions of a plugin, filled in by its entry.
 
-use super::call::{Comparison, Photo, View};
-use super::record::{Image, Text};
+use super::call::{Comparison, Photo, Picture, View};
+use super::record::{Image, Labels, Text};
 use super::result::{Localization, Region, Results};
 use super::{Services, Status};
 
@@ -100,5 +100,9 @@ pub struct Table {
             *const Results,
             *mut ErrorText,
         ) -> Status,
+    >,
+    /// Segmenter: fills the labels, each a class of the map or 255.
+    pub segment: Option<
+        unsafe extern "C" fn(*mut Instance, *const Services, *const Picture, *const Labels, *mut ErrorText) -> Status,
     >,
 }

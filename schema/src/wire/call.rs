@@ -95,6 +95,22 @@ pub struct EstimateCall {
     pub regions: Vec<WireRegion>,
 }
 
+/// Say which class each pixel is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentCall {
+    /// Bytes of the shared memory.
+    pub memory: usize,
+    /// For what the plugin sends.
+    pub scratch: Scratch,
+    /// The map's class table, by rising index.
+    pub classes: Vec<Class>,
+    /// `|u1`, rows × columns × 3: red, green, blue (sRGB).
+    pub photo: Array,
+    /// `|u1`, rows × columns: place for the answer, a class of the table or 255; 255 everywhere when the call begins.
+    pub labels: Array,
+}
+
 /// Camera intrinsics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -2,7 +2,7 @@
 
 use super::answer::{WireLocalization, WireProposal, WireRegion};
 use super::array::{Array, Number};
-use super::call::{DetectCall, EstimateCall, ScoreCall, SearchCall};
+use super::call::{DetectCall, EstimateCall, ScoreCall, SearchCall, SegmentCall};
 use super::request::{
     CastRaysRequest, ComparePanoramasRequest, CompareViewsRequest, PixelRaysRequest, PointsRequest, ProjectRequest,
     RenderRequest, Served,
@@ -26,6 +26,8 @@ pub enum ToPlugin {
     Detect(Box<DetectCall>),
     /// Say what each region means.
     Estimate(Box<EstimateCall>),
+    /// Say which class each pixel of a photo is.
+    Segment(Box<SegmentCall>),
     /// End the instance.
     Destroy {},
     /// The answer to a request of the plugin.

@@ -12,7 +12,8 @@ pub use answer::{
 };
 pub use array::{Array, Dtype, Number};
 pub use call::{
-    DetectCall, EstimateCall, ScoreCall, Scratch, SearchCall, WireCamera, WireEstimate, WirePrior, WireViews,
+    DetectCall, EstimateCall, ScoreCall, Scratch, SearchCall, SegmentCall, WireCamera, WireEstimate, WirePrior,
+    WireViews,
 };
 pub use message::{Hello, Invalid, Refused, ToHost, ToPlugin};
 pub use request::{

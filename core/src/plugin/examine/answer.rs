@@ -1,6 +1,7 @@
 //! What a plugin answered, of whatever kind, so that two answers can be held against each other.
 
-use resurvey_schema::{ChangeRegion, Localization, Proposal};
+use crate::image::LabelImage;
+use resurvey_schema::{ChangeRegion, ClassId, Localization, Proposal};
 
 /// An answer that the host would take.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,8 @@ pub(super) enum Answer {
     Regions(Vec<ChangeRegion>),
     /// Of an estimator.
     Proposals(Vec<Proposal>),
+    /// Of a segmenter.
+    Labels(LabelImage),
     /// None, and the plugin's reason.
     Refused(String),
 }
@@ -37,6 +40,13 @@ impl Answer {
                 let places = count(|one| matches!(one, Proposal::Place { .. }));
                 let removals = count(|one| matches!(one, Proposal::Remove { .. }));
                 format!("{places} to place, {removals} to remove, {} rejected", proposals.len() - places - removals)
+            }
+            Self::Labels(labels) => {
+                let mut is_used = [false; 256];
+                labels.values().iter().for_each(|label| is_used[usize::from(*label)] = true);
+                let void = labels.values().iter().filter(|label| **label == ClassId::VOID.0).count();
+                let classes = is_used[..usize::from(ClassId::VOID.0)].iter().filter(|is_used| **is_used).count();
+                format!("{classes} classes, {void} of {} px void", labels.values().len())
             }
             Self::Refused(reason) => format!("no answer: {reason}"),
         }

@@ -4,10 +4,13 @@ use super::super::error::PluginError;
 use super::super::info::Kind;
 use super::super::kinds::{Detector, Estimator, Matcher, MatcherForm};
 use super::super::open::Plugin;
+use super::super::segmenter::Segmenter;
 use super::super::services::Services;
 use super::answer::Answer;
 use super::exhibit::Exhibit;
+use super::placeless::Behind;
 use super::report::Report;
+use crate::localize::PhotoServices;
 
 /// An instance of whatever kind, whose steps are reported.
 pub(super) struct Asked<'a> {
@@ -19,6 +22,7 @@ enum Instance {
     Matcher(Matcher),
     Detector(Detector),
     Estimator(Estimator),
+    Segmenter(Segmenter),
 }
 
 impl<'a> Asked<'a> {
@@ -34,6 +38,7 @@ impl<'a> Asked<'a> {
             Kind::Matcher => Instance::Matcher(plugin.matcher(&settings)?),
             Kind::Detector => Instance::Detector(plugin.detector(&settings)?),
             Kind::Estimator => Instance::Estimator(plugin.estimator(&settings)?),
+            Kind::Segmenter => Instance::Segmenter(plugin.segmenter(&settings)?),
         };
         Ok(Self { report, instance: Some(instance) })
     }
@@ -62,6 +67,12 @@ impl<'a> Asked<'a> {
             Instance::Estimator(estimator) => {
                 self.report.step("in estimate");
                 estimator.estimate(services, &exhibit.comparison(), &exhibit.regions).map(Answer::Proposals)
+            }
+            Instance::Segmenter(segmenter) => {
+                self.report.step("in segment");
+                let listener = Behind(services);
+                let services = PhotoServices::new(services.classes(), &listener);
+                segmenter.segment(&services, &exhibit.picture()).map(Answer::Labels)
             }
         };
         match answer {

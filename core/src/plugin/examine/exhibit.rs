@@ -4,7 +4,7 @@ use super::super::input::{ComparisonInput, PhotoInput, ViewImages};
 use super::super::services::Services;
 use super::finding::Finding;
 use super::stage::{Place, Side};
-use crate::image::{LabelImage, Raster};
+use crate::image::{LabelImage, Raster, RgbImage, colours_of_labels};
 use resurvey_schema::service::{PoseEstimate, Prior, ViewFeature};
 use resurvey_schema::{Alignment, ChangeRegion, ClassId, GridPoint, Intrinsics, PixelBox, Pose};
 
@@ -73,6 +73,11 @@ impl<'a> Exhibit<'a> {
     pub(super) fn comparison(&self) -> ComparisonInput<'_> {
         let view = self.view.images();
         ComparisonInput { photo: &self.photo, view, camera: &self.camera, estimate: &self.estimate }
+    }
+
+    /// The photo in the colours of the classes.
+    pub(super) fn picture(&self) -> RgbImage {
+        colours_of_labels(&self.photo, self.services.classes())
     }
 
     pub(super) fn photo(&self) -> PhotoInput<'_> {

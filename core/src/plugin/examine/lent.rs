@@ -46,6 +46,7 @@ pub(super) struct Lent {
 pub(super) struct Inputs {
     pub photo_image: *const abi::Image,
     pub photo: *const abi::Photo,
+    pub picture: *const abi::Picture,
     pub view: *const abi::View,
     pub comparison: *const abi::Comparison,
     pub regions: *const abi::Region,
@@ -124,6 +125,11 @@ impl Lent {
         self.growing("view", view, size_of::<abi::View>())
     }
 
+    /// What says where labels go.
+    pub(super) fn labels(&mut self, labels: abi::Labels) -> Result<*const abi::Labels, Finding> {
+        self.values("labels record", &[labels])
+    }
+
     /// Everything of `exhibit`.
     pub(super) fn inputs(&mut self, exhibit: &Exhibit<'_>) -> Result<Inputs, Finding> {
         let image = self.image("photo", &exhibit.photo, 3)?;
@@ -135,6 +141,8 @@ impl Lent {
         let view = self.view(&exhibit.view)?;
         let photo = abi::Photo { labels: image, camera, prior, ..abi::Photo::new() };
         let comparison = abi::Comparison { photo: image, view, camera, estimate, ..abi::Comparison::new() };
+        let pixels = self.image("picture", &exhibit.picture(), [0x5A; 3])?;
+        let picture = abi::Picture { pixels, ..abi::Picture::new() };
         let mut regions = Vec::new();
         for region in &exhibit.regions {
             let mask = self.values("region.mask", &region.mask)?;
@@ -145,6 +153,7 @@ impl Lent {
         Ok(Inputs {
             photo_image,
             photo: self.growing("photo", photo, size_of::<abi::Photo>())?,
+            picture: self.growing("picture", picture, size_of::<abi::Picture>())?,
             view,
             comparison: self.growing("comparison", comparison, size_of::<abi::Comparison>())?,
             regions: self.bytes("regions", &regions, align_of::<abi::Region>())?.cast_const().cast(),

@@ -12,6 +12,7 @@ mod finding;
 mod lent;
 mod limits;
 mod manners;
+mod placeless;
 mod raw;
 mod report;
 mod sense;

@@ -5,7 +5,7 @@ use super::super::check::{self, Rules};
 use super::super::info::Kind;
 use super::super::lend::read_growing;
 use super::super::open::{Code, Plugin};
-use super::super::results::{self, Collector};
+use super::super::results::{self, Collected, Collector};
 use super::super::service_table::ServiceTable;
 use super::super::services::Services;
 use super::answer::Answer;
@@ -13,7 +13,11 @@ use super::exhibit::Exhibit;
 use super::finding::Finding;
 use super::guard::Block;
 use super::lent::{Host, Inputs, Layout, Lent, struct_bytes};
+use super::placeless::Behind;
 use super::report::Report;
+use crate::image::LabelImage;
+use crate::localize::PhotoServices;
+use resurvey_schema::ClassId;
 use resurvey_schema::abi::{
     self, ABI_MAJOR, ABI_MINOR, Declaration, Growing, STATUS_CANCELLED, STATUS_OK, STATUS_PANICKED, Status, Table, Text,
 };
@@ -50,6 +54,39 @@ impl Place {
             )
         };
         Ok(self.0.bytes().ok_or_else(outside)?.to_vec())
+    }
+}
+
+/// A place for the labels of a segmenter, with rows padded.
+struct LabelPlace {
+    place: Place,
+    size: (u32, u32),
+    row_bytes: usize,
+}
+
+impl LabelPlace {
+    fn new(size: (u32, u32), padding: usize) -> Result<Self, Finding> {
+        let row_bytes = size.0 as usize + padding;
+        let place = Place::new("labels", &vec![ClassId::VOID.0; row_bytes * size.1 as usize])?;
+        Ok(Self { place, size, row_bytes })
+    }
+
+    fn record(&self) -> abi::Labels {
+        abi::Labels { data: self.place.0.data(), width: self.size.0, height: self.size.1, row_bytes: self.row_bytes }
+    }
+
+    /// The labels, unless something was written between the rows or around them.
+    fn read(&self) -> Result<LabelImage, Finding> {
+        let (bytes, (width, height)) = (self.place.read("the labels")?, self.size);
+        let rows = bytes.chunks_exact(self.row_bytes).map(|row| row.split_at(width as usize));
+        if rows.clone().any(|(_, behind)| behind.iter().any(|byte| *byte != ClassId::VOID.0)) {
+            return Err(Finding::failed(
+                "something was written behind the end of a row of labels",
+                "write `width` labels a row, and step from row to row by row_bytes",
+            ));
+        }
+        let values = rows.flat_map(|(labels, _)| labels.iter().copied()).collect();
+        LabelImage::from_values(width, height, values).ok_or_else(|| Finding::failed("labels were lost", "report this"))
     }
 }
 
@@ -114,7 +151,8 @@ impl<'a> Raw<'a> {
         let older = match plugin.info().kind {
             Kind::Matcher => offset_of!(Table, detect),
             Kind::Detector => offset_of!(Table, estimate),
-            Kind::Estimator => size_of::<Table>(),
+            Kind::Estimator => offset_of!(Table, segment),
+            Kind::Segmenter => size_of::<Table>(),
         };
         let sent = struct_bytes(&Table::new(), host, older);
         let (place, error) = (Place::new("table", &sent)?, ErrorPlace::new()?);
@@ -191,6 +229,9 @@ impl RawInstance<'_> {
     ) -> Result<Answer, Finding> {
         let (camera, classes) = (&exhibit.camera, services.classes());
         let rules = Rules { classes, width: camera.width, height: camera.height, regions: exhibit.regions.len() };
+        let listener = Behind(services);
+        let placeless = PhotoServices::new(classes, &listener);
+        let services = if self.kind() == Kind::Segmenter { &placeless } else { services };
         let (collector, service_table) = (Collector::new(rules), ServiceTable::new(services));
         let mut lent = Lent::new(layout);
         let inputs = lent.inputs(exhibit)?;
@@ -199,14 +240,24 @@ impl RawInstance<'_> {
         let score = Place::new("score", &f64::NAN.to_ne_bytes())?;
         let sent = struct_bytes(&abi::Localization::new(), layout.host, offset_of!(abi::Localization, has_alignment));
         let found = Place::new("found", &sent)?;
+        let labels = LabelPlace::new((camera.width, camera.height), layout.padding)?;
+        let labels_record = lent.labels(labels.record())?;
         let error = ErrorPlace::new()?;
         lent.seal();
         let to = if layout.is_silent { null_mut() } else { error.pointer() };
-        let places = Places { services, results, score: score.0.data(), found: found.0.data(), error: to };
+        let places = Places {
+            services,
+            results,
+            score: score.0.data(),
+            found: found.0.data(),
+            labels: labels_record,
+            error: to,
+        };
         let status = self.dispatch(&inputs, &places)?;
         lent.close();
         let text = error.text()?;
         let (score, filled) = (score.read("the score")?, found.read("the localization")?);
+        let labels = labels.read()?;
         let known = sent.len().min(size_of::<abi::Localization>());
         if filled[..4] != sent[..4] || filled[known..] != sent[known..] {
             return Err(Finding::failed(
@@ -214,10 +265,13 @@ impl RawInstance<'_> {
                 "write field by field, none beyond `size`, and leave `size` alone",
             ));
         }
-        let collected = collector.finish();
-        let outcome = match (status, collected.violation) {
+        let mut collected = collector.finish();
+        let outcome = match (status, collected.violation.take()) {
             (_, Some(violation)) => return Err(violated(&violation)),
-            (STATUS_OK, None) => self.answer(&score, &found, collected.heat, collected.regions, collected.proposals),
+            (STATUS_OK, None) if self.kind() == Kind::Segmenter => {
+                check::labels(&labels, classes).map(|()| Answer::Labels(labels))
+            }
+            (STATUS_OK, None) => self.answer(&score, &found, collected),
             (STATUS_PANICKED, None) => {
                 return Err(Finding::failed(format!("panicked: {text}…"), "return an error with the reason instead"));
             }
@@ -229,13 +283,13 @@ impl RawInstance<'_> {
 
     fn dispatch(&self, inputs: &Inputs, places: &Places) -> Result<Status, Finding> {
         let table = &self.raw.table;
-        let Inputs { photo_image, photo, view, comparison, regions, region_count, region_step } = *inputs;
-        let Places { services, results, score, found, error } = *places;
+        let Inputs { photo_image, photo, picture, view, comparison, regions, region_count, region_step } = *inputs;
+        let Places { services, results, score, found, labels, error } = *places;
         let step = |name: &str| self.raw.report.step(name);
         // SAFETY: functions of the plugin's own table; everything lent lives until they return, and this instance is
         // called by nobody else.
         let status = unsafe {
-            match (self.raw.plugin.info().kind, table.score, table.search) {
+            match (self.kind(), table.score, table.search) {
                 (Kind::Matcher, _, Some(search)) => {
                     step("in search");
                     search(self.pointer, services, photo, results, found.cast(), error)
@@ -255,25 +309,28 @@ impl RawInstance<'_> {
                     step("in estimate");
                     estimate(self.pointer, services, comparison, regions, region_count, region_step, results, error)
                 }
+                (Kind::Segmenter, ..) => {
+                    let segment = table.segment.ok_or_else(|| no_function("segment"))?;
+                    step("in segment");
+                    segment(self.pointer, services, picture, labels, error)
+                }
             }
         };
         step("after the call");
         Ok(status)
     }
 
-    fn answer(
-        &self,
-        score: &[u8],
-        found: &Place,
-        heat: Vec<[f64; 3]>,
-        regions: Vec<resurvey_schema::ChangeRegion>,
-        proposals: Vec<resurvey_schema::Proposal>,
-    ) -> Result<Answer, check::Violation> {
-        match self.raw.plugin.info().kind {
+    fn kind(&self) -> Kind {
+        self.raw.plugin.info().kind
+    }
+
+    /// The answer of whoever does not write labels.
+    fn answer(&self, score: &[u8], found: &Place, collected: Collected) -> Result<Answer, check::Violation> {
+        match self.kind() {
             Kind::Matcher if self.raw.table.search.is_some() => {
                 // SAFETY: the place holds a whole struct with its size first.
                 let record = unsafe { read_growing(found.0.data().cast_const().cast()) }.unwrap_or_default();
-                let found = results::localization(&record, heat);
+                let found = results::localization(&record, collected.heat);
                 check::localization(&found)?;
                 Ok(Answer::Pose(Box::new(found)))
             }
@@ -284,8 +341,8 @@ impl RawInstance<'_> {
                 check::ratio("score", score)?;
                 Ok(Answer::Score(score))
             }
-            Kind::Detector => Ok(Answer::Regions(regions)),
-            Kind::Estimator => Ok(Answer::Proposals(proposals)),
+            Kind::Detector => Ok(Answer::Regions(collected.regions)),
+            Kind::Estimator | Kind::Segmenter => Ok(Answer::Proposals(collected.proposals)),
         }
     }
 }
@@ -311,6 +368,7 @@ struct Places {
     results: *const abi::Results,
     score: *mut u8,
     found: *mut u8,
+    labels: *const abi::Labels,
     error: *mut abi::ErrorText,
 }
 

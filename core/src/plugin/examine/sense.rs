@@ -20,7 +20,7 @@ const MEASURED: f64 = 0.02;
 /// How near to the banner a removal must be, metres.
 const REMOVED_M: f64 = 1.0;
 
-/// A view matches itself best; equal images give no change; a toy wall is measured within 2 %.
+/// A view matches itself best; equal images give no change; a toy wall is measured within 2 %; labels are classes.
 pub(super) fn sense(bench: &Bench<'_>) -> Tried {
     let plugin = bench.open()?;
     bench.at(PHOTO, |place| {
@@ -30,8 +30,18 @@ pub(super) fn sense(bench: &Bench<'_>) -> Tried {
             Kind::Matcher => the_pose_is_found(place, &mut asked),
             Kind::Detector => changes_are_found(place, &mut asked),
             Kind::Estimator => a_banner_is_measured(place, &mut asked),
+            Kind::Segmenter => labels_are_known(place, &mut asked),
         }
     })
+}
+
+/// Which classes are right depends on what the plugin was trained on: that all are classes of the map, and as many as
+/// there are pixels, the host has seen to.
+fn labels_are_known(place: &Place<'_>, asked: &mut Asked<'_>) -> Tried {
+    match asked.ask(&Exhibit::new(place, place.same)?)? {
+        answer @ Answer::Labels(_) => Ok(Finding::passed(answer.words())),
+        answer => Err(no_sense(&answer)),
+    }
 }
 
 fn no_sense(answer: &Answer) -> Finding {

@@ -166,6 +166,7 @@ fn unanswered(plugin: &Plugin, text: &str) -> Finding {
         Kind::Matcher => "search",
         Kind::Detector => "detect",
         Kind::Estimator => "estimate",
+        Kind::Segmenter => "segment",
     };
     PluginError::Failed { plugin: plugin.info().name.clone(), call, text: text.to_owned() }.into()
 }

@@ -5,6 +5,7 @@ use super::lending::Lending;
 use super::link::{Handled, Link, Turn};
 use super::program::Program;
 use super::translate;
+use crate::image::{LabelImage, RgbImage};
 use crate::plugin::check::{self, Rules, Violation};
 use crate::plugin::error::PluginError;
 use crate::plugin::input::{ComparisonInput, PhotoInput};
@@ -12,8 +13,10 @@ use crate::plugin::open::Plugin;
 use crate::plugin::results::Collected;
 use crate::plugin::services::Services;
 use crate::plugin::settings::Settings;
-use resurvey_schema::wire::{DetectCall, EstimateCall, SearchCall, ToPlugin, WireLocalization, WireRegion};
-use resurvey_schema::{ChangeRegion, Class, Localization, Proposal};
+use resurvey_schema::wire::{
+    DetectCall, EstimateCall, SearchCall, SegmentCall, ToPlugin, WireLocalization, WireRegion,
+};
+use resurvey_schema::{ChangeRegion, Class, ClassId, Localization, Proposal};
 use std::io;
 use std::sync::Arc;
 
@@ -165,6 +168,35 @@ impl Apart {
         };
         let (collected, _) = self.call("estimate", services, rules(services, input, regions.len()), lend)?;
         Ok(collected.proposals)
+    }
+
+    pub(in super::super) fn segment(
+        &mut self,
+        services: &dyn Services,
+        photo: &RgbImage,
+    ) -> Result<LabelImage, PluginError> {
+        let (width, height) = (photo.width(), photo.height());
+        let rules = Rules { classes: services.classes(), width, height, regions: 0 };
+        let mut labels = LabelImage::filled(width, height, ClassId::VOID.0);
+        let mut place = 0;
+        let lend = |lending: &mut Lending| {
+            let (rows, columns) = (height as usize, width as usize);
+            let answer = lending.raster(&labels)?;
+            place = answer.offset;
+            Ok(ToPlugin::Segment(Box::new(SegmentCall {
+                photo: lending.lend(&[rows, columns, 3], photo.values())?,
+                labels: answer,
+                scratch: lending.scratch(photo.values().len())?,
+                classes: classes(services),
+                memory: lending.memory.bytes(),
+            })))
+        };
+        self.call("segment", services, rules, lend)?;
+        self.with_link(|link| Ok(link.lending.memory.read_into(place, labels.values_mut())))?;
+        check::labels(&labels, services.classes()).map_err(|Violation { field, value, expected }| {
+            PluginError::InvalidOutput { plugin: self.name(), call: "segment", field, value, expected }
+        })?;
+        Ok(labels)
     }
 
     /// One call with services and results; a violation comes before whatever the plugin itself says.

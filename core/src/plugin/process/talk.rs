@@ -11,7 +11,7 @@ use crate::plugin::{lend, line};
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{
-    Array, DetectCall, Dtype, EstimateCall, ScoreCall, SearchCall, ToHost, ToPlugin, WireRegion, WireViews,
+    Array, DetectCall, Dtype, EstimateCall, ScoreCall, SearchCall, SegmentCall, ToHost, ToPlugin, WireRegion, WireViews,
 };
 use std::io;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -66,6 +66,7 @@ impl Talk {
             ToPlugin::Search(call) => self.search(instance, call),
             ToPlugin::Detect(call) => self.detect(instance, call),
             ToPlugin::Estimate(call) => self.estimate(instance, call),
+            ToPlugin::Segment(call) => self.segment(instance, call),
             _ => Err(not_lent("the call")),
         }
     }
@@ -128,6 +129,19 @@ impl Talk {
         // SAFETY: as in `detect`.
         let proposals = unsafe { line::estimate(instance, &asking, &lent.comparison(), &records) }?;
         asking.deliver_proposals(&proposals)?;
+        Ok(ToHost::Done { localization: None })
+    }
+
+    fn segment(&self, instance: &mut Instance, call: &SegmentCall) -> Result<ToHost, PluginError> {
+        self.follow(call.memory)?;
+        let pixels = image(&self.lock().memory, &call.photo, None)?;
+        let picture = abi::Picture { pixels, ..abi::Picture::new() };
+        let asking = Asking::new(self, call.scratch, &call.classes)?;
+        // SAFETY: as in `search`.
+        let labels = unsafe { line::segment(instance, &asking, &picture) }?;
+        if !self.lock().memory.write(call.labels.offset, labels.values()) {
+            return Err(not_lent("the place for the labels"));
+        }
         Ok(ToHost::Done { localization: None })
     }
 }
