@@ -193,7 +193,7 @@ pub struct PriorFrom {
     /// Time to look up in the log, with its zone, e.g. 2026-06-01T10:28:00+08:00; default: the capture's taken_at
     #[arg(long, value_name = "T", requires = "nmea", value_parser = time)]
     pub at_time: Option<Timestamp>,
-    /// Take the prior from the EXIF of this photo
+    /// Take the prior from the EXIF of this photo; with --segmenter the labels too, and the EXIF may be missing
     #[arg(long, value_name = "FILE.jpg", conflicts_with = "nmea")]
     pub photo: Option<PathBuf>,
 }
@@ -205,6 +205,15 @@ impl PriorFrom {
     }
 }
 
+/// Where the labels come from, when not from the label image of capture.json.
+#[derive(Debug, Default, Args)]
+pub struct LabelsFrom {
+    /// Make the labels of the --photo with this plugin, instead of reading the label image; "resurvey plugins list" lists
+    /// segmenters
+    #[arg(long, value_name = "NAME", requires = "photo")]
+    pub segmenter: Option<String>,
+}
+
 /// Arguments of `localize`.
 #[derive(Debug, Args)]
 pub struct Localize {
@@ -214,6 +223,8 @@ pub struct Localize {
     pub capture: PathBuf,
     #[command(flatten)]
     pub prior: PriorFrom,
+    #[command(flatten)]
+    pub labels: LabelsFrom,
     /// VPS matcher; "resurvey plugins list" lists them
     #[arg(long, default_value = "semantic")]
     pub matcher: String,
@@ -266,6 +277,8 @@ pub struct Update {
     pub captures: Vec<PathBuf>,
     #[command(flatten)]
     pub prior: PriorFrom,
+    #[command(flatten)]
+    pub labels: LabelsFrom,
     /// Take this pose instead of localizing, with one capture: a JSON file with a "pose"
     #[arg(long, value_name = "POSE.json")]
     pub pose: Option<PathBuf>,

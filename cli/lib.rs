@@ -10,6 +10,7 @@ mod matching;
 mod prior;
 mod region;
 mod report;
+mod segment;
 mod tools;
 
 use args::{Cli, Command};

@@ -3,6 +3,7 @@
 use crate::args::PriorFrom;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::segment::Segmenting;
 use resurvey_core::capture::{Capture, PriorOrigin, PriorReport, PriorSource, RoughCapture};
 use resurvey_core::crs::Crs;
 use resurvey_core::localize::World;
@@ -22,15 +23,23 @@ pub struct Placed {
     pub prior: Value,
 }
 
-/// Reads the capture at `path`, with what `from` names, and the map around `given` or else around its prior.
+/// Reads the capture at `path`, with what `from` names and the labels that `segmenting` makes, if any, and the map around
+/// `given` or else around its prior.
 pub fn read_placed(
     path: &Path,
-    from: &PriorFrom,
+    (from, segmenting): (&PriorFrom, Option<&mut Segmenting>),
     given: Option<Pose>,
     (snapshot, crs): (&Snapshot<'_>, Crs),
     console: &mut Console<'_>,
 ) -> Result<Placed, Failure> {
-    let rough = RoughCapture::read(path, &source(from), snapshot.classes(), crs)?;
+    let classes = snapshot.classes();
+    let rough = match segmenting {
+        Some(segmenting) => {
+            let photo = segmenting.segment(path, classes, console)?;
+            RoughCapture::read_labelled(path, photo, classes, crs)?
+        }
+        None => RoughCapture::read(path, &source(from), classes, crs)?,
+    };
     let world = world_around(snapshot, given.map_or(rough.position(), |pose| pose.position))?;
     let (capture, report) = rough.settle(world.scene(false))?;
     for note in &report.notes {

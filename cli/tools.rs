@@ -42,6 +42,7 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         resurvey_class_difference::plugin(),
         resurvey_aligned::plugin(),
         resurvey_descriptors::plugin(),
+        resurvey_palette::plugin(),
     ] {
         registry.add_builtin(declaration)?;
     }

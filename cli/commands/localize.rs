@@ -7,6 +7,7 @@ use crate::document;
 use crate::failure::{Failure, UNRELIABLE};
 use crate::matching::MatchingTool;
 use crate::prior::{Placed, read_placed};
+use crate::segment::Segmenting;
 use crate::tools::{Choices, registry};
 use resurvey_core::capture::read_pose;
 use resurvey_core::localize::{HeatMap, SceneServices, heat_map, localize};
@@ -18,19 +19,21 @@ use std::path::Path;
 /// Finds the pose of a capture. Exit code 0 when it is reliable, 22 when it is not.
 pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     let registry = registry(plugins)?;
-    let mut choices = Choices::read(&options.settings, &[&options.matcher])?;
+    let names: Vec<&str> = options.labels.segmenter.as_deref().into_iter().chain([options.matcher.as_str()]).collect();
+    let mut choices = Choices::read(&options.settings, &names)?;
     if options.exhaustive {
         choices.exhaustive(&registry, &options.matcher)?;
     }
     let mut matcher = MatchingTool::load(&registry, &choices, &options.matcher)?.matching()?;
+    let mut segmenting = Segmenting::load(&options.labels, &options.prior, &registry, &choices)?;
     let map = MapFile::open_read_only(&options.map)?;
     let snapshot = map.snapshot(map.resolve(&options.at)?)?;
     let crs = crs_of(&map)?;
     let truth = options.truth.as_deref().map(read_pose).transpose()?;
     let mut timings = Map::new();
     let stage = console.stage("read");
-    let Placed { capture, world, prior } =
-        read_placed(&options.capture, &options.prior, None, (&snapshot, crs), console)?;
+    let from = (&options.prior, segmenting.as_mut());
+    let Placed { capture, world, prior } = read_placed(&options.capture, from, None, (&snapshot, crs), console)?;
     timings.insert("read".to_owned(), json!(console.finish(&stage)));
     let stage = console.stage("localize");
     let services = SceneServices::new(&world, &capture, crs, &stage);

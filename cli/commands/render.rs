@@ -28,7 +28,8 @@ pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
     let stage = console.stage("render");
     let (camera, pose, world) = match (&options.capture, given) {
         (Some(path), given) => {
-            let Placed { capture, world, .. } = read_placed(path, &options.prior, given, (&snapshot, crs), console)?;
+            let Placed { capture, world, .. } =
+                read_placed(path, (&options.prior, None), given, (&snapshot, crs), console)?;
             (capture.camera, given.unwrap_or(capture.prior.pose), world)
         }
         (None, Some(_)) if options.prior.is_given() => {

@@ -10,6 +10,7 @@ use crate::failure::{Failure, NOTHING, UNRELIABLE};
 use crate::matching::MatchingTool;
 use crate::prior::{Placed, read_placed};
 use crate::report::{Reports, Seen, Sheet};
+use crate::segment::Segmenting;
 use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, GivenPose, read_given_pose};
@@ -97,9 +98,10 @@ fn refuse_one_for_several(options: &Update) -> Result<(), Failure> {
     }
 }
 
-/// The three plugins of one run.
+/// The plugins of one run.
 struct Tools {
     choices: Choices,
+    segmenting: Option<Segmenting>,
     matcher: Matching,
     comparers: Comparers,
 }
@@ -108,7 +110,7 @@ struct Tools {
 pub(super) struct Comparers {
     pub(super) detector: Detector,
     pub(super) estimator: Estimator,
-    /// Every plugin of the run for the evidence, the matcher first.
+    /// Every plugin of the run for the evidence, in the order in which they are called.
     pub(super) used: Vec<PluginUse>,
 }
 
@@ -116,11 +118,14 @@ impl Tools {
     fn load(options: &Update, plugins: &PluginSearch) -> Result<Self, Failure> {
         let registry = registry(plugins)?;
         let names = [options.matcher.as_str(), options.detector.as_str(), options.estimator.as_str()];
-        let choices = Choices::read(&options.settings, &names)?;
+        let all: Vec<&str> = options.labels.segmenter.as_deref().into_iter().chain(names).collect();
+        let choices = Choices::read(&options.settings, &all)?;
+        let segmenting = Segmenting::load(&options.labels, &options.prior, &registry, &choices)?;
         let load = |name: &str| -> Result<Tool, Failure> { choices.tool(&tools::load(&registry, name)?) };
         let matcher = MatchingTool::load(&registry, &choices, names[0])?;
         let [detector, estimator] = [load(names[1])?, load(names[2])?];
-        let mut used = matcher.used()?;
+        let mut used: Vec<PluginUse> = segmenting.iter().map(|one| one.used.clone()).collect();
+        used.extend(matcher.used()?);
         used.extend([detector.used()?, estimator.used()?]);
         Ok(Self {
             matcher: matcher.matching()?,
@@ -130,6 +135,7 @@ impl Tools {
                 used,
             },
             choices,
+            segmenting,
         })
     }
 }
@@ -191,7 +197,8 @@ impl Run<'_> {
             }
             return Ok((document, 0));
         }
-        let work = self.read(path, given.map(|given| given.pose), prior, console)?;
+        let from = (prior, tools.segmenting.as_mut());
+        let work = self.read(path, given.map(|given| given.pose), from, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
         let used = (tools.matcher.info(), tools.comparers.used.as_slice());
@@ -216,13 +223,13 @@ impl Run<'_> {
         &mut self,
         path: &Path,
         given: Option<Pose>,
-        prior: &PriorFrom,
+        from: (&PriorFrom, Option<&mut Segmenting>),
         console: &mut Console<'_>,
     ) -> Result<Work, Failure> {
         let base = self.map.head()?;
         let snapshot = self.map.snapshot(base)?;
         let stage = console.stage("read");
-        let Placed { capture, world, prior } = read_placed(path, prior, given, (&snapshot, self.crs), console)?;
+        let Placed { capture, world, prior } = read_placed(path, from, given, (&snapshot, self.crs), console)?;
         self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
         Ok(Work { base, capture, world, prior })
     }

@@ -154,7 +154,7 @@ fn capture(
     let [yaw, pitch, roll] = attitude_deg(camera);
     Ok(CaptureFile {
         format: FORMAT.to_owned(),
-        labels: "labels.png".to_owned(),
+        labels: Some("labels.png".to_owned()),
         taken_at: Some(format!("2026-06-01T{}:{:02}:00+08:00", shot.hour(), spec.seed % 60)),
         camera: CameraFile {
             model: "pinhole".to_owned(),

@@ -12,8 +12,9 @@ pub const FORMAT: &str = "resurvey.capture/1";
 pub struct CaptureFile {
     /// Always [`FORMAT`].
     pub format: String,
-    /// Path of the label image, relative to the file.
-    pub labels: String,
+    /// Path of the label image, relative to the file; left out where a segmenter makes the labels from a photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<String>,
     /// RFC 3339 time of the photo.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken_at: Option<String>,

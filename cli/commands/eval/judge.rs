@@ -167,7 +167,7 @@ impl Judge<'_> {
 
 /// Reads the capture at `path` and `map` around it.
 pub fn read(map: &MapFile, path: &Path) -> Result<Work, Failure> {
-    quietly(|console| run_on(map)?.read(path, None, &PriorFrom::default(), console))
+    quietly(|console| run_on(map)?.read(path, None, (&PriorFrom::default(), None), console))
 }
 
 fn run_on(map: &MapFile) -> Result<Run<'_>, Failure> {

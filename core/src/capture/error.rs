@@ -86,6 +86,30 @@ pub enum CaptureError {
     /// The label image cannot be read.
     #[error(transparent)]
     Labels(#[from] ImageError),
+    /// The photo cannot become one of the camera's size.
+    #[error(
+        "{}: the photo is {}×{} px upright, the camera of {} {}×{} px; expected the same aspect ratio and no fewer pixels",
+        photo.display(), found.0, found.1, capture.display(), expected.0, expected.1
+    )]
+    PhotoSize {
+        /// The photo.
+        photo: PathBuf,
+        /// The capture.
+        capture: PathBuf,
+        /// Columns and rows of the photo.
+        found: (u32, u32),
+        /// Columns and rows of the camera.
+        expected: (u32, u32),
+    },
+    /// Nobody says what the photo shows.
+    #[error(
+        "{}: expected labels, the path of a label image, or a photo and a segmenter that makes them; found neither",
+        capture.display()
+    )]
+    NoLabels {
+        /// The capture.
+        capture: PathBuf,
+    },
     /// The label image has another size than the camera.
     #[error(
         "{}: the label image is {}×{} px, the camera of {} is {}×{} px",

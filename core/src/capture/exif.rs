@@ -58,6 +58,16 @@ pub fn read_exif(bytes: &[u8]) -> Result<Fix, ExifError> {
     })
 }
 
+/// How the pixels of the image file `bytes` lie (TIFF 6.0, tag 274): 1, upright, where nothing says it.
+pub(super) fn orientation(bytes: &[u8]) -> u32 {
+    let exif = Reader::new()
+        .continue_on_error(true)
+        .read_from_container(&mut Cursor::new(bytes))
+        .or_else(|error| error.distill_partial_result(|_| ()));
+    let field = exif.as_ref().ok().and_then(|exif| exif.get_field(Tag::Orientation, In::PRIMARY));
+    field.and_then(|field| field.value.get_uint(0)).unwrap_or(1)
+}
+
 /// Tokyo and the Chinese map datum are off by half a kilometre.
 fn check_datum(exif: &Exif) -> Result<(), ExifError> {
     let datum = text(exif, Tag::GPSMapDatum).unwrap_or_default();

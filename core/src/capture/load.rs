@@ -1,22 +1,22 @@
-//! Reading `capture.json` and the label image beside it.
+//! Reading `capture.json` and the label image beside it, or the labels that a segmenter made of a photo.
 
-use super::{CaptureError, PriorSource, RoughCapture};
+use super::{CaptureError, LabelledPhoto, PriorSource, RoughCapture};
 use crate::camera::Camera;
 use crate::crs::Crs;
-use crate::image::{ImageError, LabelImage, LabelReading, read_labels};
+use crate::image::{ImageError, LabelImage, LabelReading, read_labels, write_label_png};
 use crate::version::Digest;
 use jiff::Timestamp;
 use resurvey_schema::capture::FORMAT;
 use resurvey_schema::service::Prior;
 use resurvey_schema::{CaptureFile, ClassTable, GridPoint, Pose};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A labelled photo with its camera and prior, all checked.
 #[derive(Clone, Debug)]
 pub struct Capture {
     /// Class per pixel, of the camera's size; 255 is void.
     pub labels: LabelImage,
-    /// The label image as it was read, for the evidence.
+    /// The label image as it was read, or a PNG of what a segmenter made, for the evidence.
     pub label_bytes: Vec<u8>,
     /// The camera.
     pub camera: Camera,
@@ -24,7 +24,8 @@ pub struct Capture {
     pub prior: Prior,
     /// When the photo was taken.
     pub taken_at: Option<Timestamp>,
-    /// Digest over `capture.json` and the label image.
+    /// Digest over `capture.json` and the file that the labels come from: the label image, or the photo that a
+    /// segmenter read (whichever segmenter that was).
     pub digest: Digest,
 }
 
@@ -37,30 +38,56 @@ impl Capture {
 
     /// The labels and camera of `path`, with a prior that says nothing: somebody else knows it.
     pub fn labelled(path: &Path, classes: &ClassTable) -> Result<Self, CaptureError> {
-        Self::with_labels(path, &read_file(path)?, UNKNOWN, None, classes)
+        let file_and_text = read_file(path)?;
+        let labelling = Labelling::beside(path, &file_and_text.0, classes)?;
+        Self::with_labels(path, &file_and_text, (UNKNOWN, None), labelling)
     }
 
-    /// The capture of `file`, whose text is `text`, with its label image.
+    /// The capture of `file`, whose text is `text`, with its labels, prior and time.
     pub(super) fn with_labels(
         path: &Path,
         (file, text): &(CaptureFile, Vec<u8>),
-        prior: Prior,
-        taken_at: Option<Timestamp>,
-        classes: &ClassTable,
+        (prior, taken_at): (Prior, Option<Timestamp>),
+        labelling: Labelling,
     ) -> Result<Self, CaptureError> {
         let camera =
             Camera::from_file(&file.camera).map_err(|source| CaptureError::Camera { path: path.to_owned(), source })?;
-        let label_path = path.parent().unwrap_or(Path::new("")).join(&file.labels);
-        let label_bytes =
-            std::fs::read(&label_path).map_err(|source| CaptureError::Io { path: label_path.clone(), source })?;
-        let labels = read_labels(&label_bytes, classes, &LabelReading::default())
-            .map_err(|source| ImageError::InFile { path: label_path.clone(), source: Box::new(source) })?;
+        let Labelling { path: label_path, labels, label_bytes, digest } = labelling;
         let (found, expected) = ((labels.width(), labels.height()), (camera.width(), camera.height()));
         if found != expected {
             return Err(CaptureError::Size { labels: label_path, capture: path.to_owned(), found, expected });
         }
-        let digest = Digest::of(&[Digest::of(text).0, Digest::of(&label_bytes).0].concat());
+        let digest = Digest::of(&[Digest::of(text).0, digest.0].concat());
         Ok(Self { labels, label_bytes, camera, prior, taken_at, digest })
+    }
+}
+
+/// The labels of a capture, wherever they come from.
+pub(super) struct Labelling {
+    /// The file that they come from.
+    path: PathBuf,
+    labels: LabelImage,
+    label_bytes: Vec<u8>,
+    /// Of the file.
+    digest: Digest,
+}
+
+impl Labelling {
+    /// The label image that `file`, read from `capture`, names.
+    pub(super) fn beside(capture: &Path, file: &CaptureFile, classes: &ClassTable) -> Result<Self, CaptureError> {
+        let Some(name) = &file.labels else { return Err(CaptureError::NoLabels { capture: capture.to_owned() }) };
+        let path = capture.parent().unwrap_or(Path::new("")).join(name);
+        let label_bytes = std::fs::read(&path).map_err(|source| CaptureError::Io { path: path.clone(), source })?;
+        let labels = read_labels(&label_bytes, classes, &LabelReading::default())
+            .map_err(|source| ImageError::InFile { path: path.clone(), source: Box::new(source) })?;
+        Ok(Self { path, labels, digest: Digest::of(&label_bytes), label_bytes })
+    }
+
+    /// The labels that a segmenter made.
+    pub(super) fn made(photo: LabelledPhoto, classes: &ClassTable) -> Result<Self, CaptureError> {
+        let LabelledPhoto { path, labels, digest } = photo;
+        let label_bytes = write_label_png(&labels, classes)?;
+        Ok(Self { path, labels, label_bytes, digest })
     }
 }
 

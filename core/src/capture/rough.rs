@@ -2,13 +2,15 @@
 
 use super::fix::Fix;
 use super::ground::ground_near;
-use super::load::{parse_time, read_file};
+use super::load::{Labelling, parse_time, read_file};
 use super::prior::{HEIGHT_SIGMA_M, PriorInput, RoughHeight, RoughPrior, rough_prior};
-use super::{Capture, CaptureError, NmeaLog, PriorOrigin, PriorReport, SentenceCounts, read_exif};
+use super::{
+    Capture, CaptureError, ExifError, LabelledPhoto, NmeaLog, PriorOrigin, PriorReport, SentenceCounts, read_exif,
+};
 use crate::crs::Crs;
 use crate::render::Scene;
 use jiff::Timestamp;
-use resurvey_schema::{ClassTable, GridPoint};
+use resurvey_schema::{CaptureFile, ClassTable, GridPoint};
 use std::path::{Path, PathBuf};
 
 /// Height of a phone in the hand above the ground, metres.
@@ -57,6 +59,40 @@ impl RoughCapture {
     /// Reads the capture at `path`, its label image, and the file of `source`, for a map with `classes` in `crs`.
     pub fn read(path: &Path, source: &PriorSource, classes: &ClassTable, crs: Crs) -> Result<Self, CaptureError> {
         let file_and_text = read_file(path)?;
+        Self::with(path, &file_and_text, source, crs, || Labelling::beside(path, &file_and_text.0, classes))
+    }
+
+    /// Reads the capture at `path`, whose labels a segmenter made of `photo`. The EXIF of the photo says the position
+    /// where it has one, else `capture.json` does.
+    pub fn read_labelled(
+        path: &Path,
+        photo: LabelledPhoto,
+        classes: &ClassTable,
+        crs: Crs,
+    ) -> Result<Self, CaptureError> {
+        let file_and_text = read_file(path)?;
+        let photo_path = photo.path.clone();
+        let labelling = || Labelling::made(photo, classes);
+        let bytes =
+            std::fs::read(&photo_path).map_err(|source| CaptureError::Io { path: photo_path.clone(), source })?;
+        match read_exif(&bytes) {
+            Err(reason @ (ExifError::Unreadable { .. } | ExifError::NoPosition { .. })) => {
+                let mut rough = Self::with(path, &file_and_text, &PriorSource::Capture, crs, labelling)?;
+                let note = format!("{}: no position: {reason}; it is that of capture.json", photo_path.display());
+                rough.report.notes.push(note);
+                Ok(rough)
+            }
+            _ => Self::with(path, &file_and_text, &PriorSource::Photo(photo_path), crs, labelling),
+        }
+    }
+
+    fn with(
+        path: &Path,
+        file_and_text: &(CaptureFile, Vec<u8>),
+        source: &PriorSource,
+        crs: Crs,
+        labelling: impl FnOnce() -> Result<Labelling, CaptureError>,
+    ) -> Result<Self, CaptureError> {
         let file = &file_and_text.0;
         let stated_at = file.taken_at.as_deref().map(|time| parse_time(time, path)).transpose()?;
         let said = Said::read(source, stated_at, path)?;
@@ -66,7 +102,7 @@ impl RoughCapture {
         let RoughPrior { prior, height, mut report } = rough_prior(&input).map_err(|error| source.blamed_for(error))?;
         report.sentences = said.sentences;
         report.notes.extend(said.sentences.filter(|counts| counts.skipped() > 0).map(|counts| skipped(&counts)));
-        let capture = Capture::with_labels(path, &file_and_text, prior, taken_at, classes)?;
+        let capture = Capture::with_labels(path, file_and_text, (prior, taken_at), labelling()?)?;
         Ok(Self { capture, height, report, path: path.to_owned() })
     }
 
