@@ -13,7 +13,7 @@ use resurvey_core::camera::{Camera, world_from_camera};
 use resurvey_core::capture::Capture;
 use resurvey_core::image::{LabelReading, read_labels};
 use resurvey_core::localize::{GateLimits, Located, SceneServices, SearchLimits, localize};
-use resurvey_core::plugin::Registry;
+use resurvey_core::plugin::{Kind, Registry};
 use resurvey_core::store::{History, MapFile, RecordedObservation, Snapshot};
 use resurvey_core::update::{Change, add_changes, world_around};
 use resurvey_core::version::{
@@ -116,6 +116,15 @@ fn capture(
     options: &Replay,
 ) -> Result<Capture, Failure> {
     let seen = &recorded.observation;
+    let segmenter = seen.plugins.iter().find(|used| used.kind == Kind::Segmenter.to_string());
+    if let (Some(path), Some(segmenter)) = (&options.capture, segmenter) {
+        return Err(Failure::input(format!(
+            "{}: the labels were made by the segmenter {}, which is not run again: leave out --capture, which works where \
+             update --keep-labels kept them",
+            path.display(),
+            segmenter.name
+        )));
+    }
     if let Some(path) = &options.capture {
         let mut capture = Capture::labelled(path, snapshot.classes())?;
         if capture.digest != seen.capture {

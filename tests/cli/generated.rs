@@ -17,6 +17,7 @@ fn the_built_in_plugins_are_listed_with_the_documented_keys() {
         ("class-difference", "detector"),
         ("aligned", "detector"),
         ("descriptors", "estimator"),
+        ("palette", "segmenter"),
     ] {
         let plugin = plugins.iter().find(|plugin| plugin["name"] == name).unwrap();
         let keys: Vec<&String> = plugin.as_object().unwrap().keys().collect();

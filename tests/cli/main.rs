@@ -28,6 +28,7 @@ mod priors;
 mod provenance;
 mod reports;
 mod reviews;
+mod segmenters;
 mod table_v;
 mod time_axes;
 mod undoing;

@@ -36,6 +36,7 @@ const fn rust(mode: &'static str, test: &'static str, words: &'static [&'static 
 const MATCHER: &str = "faulty_matcher.c";
 const DETECTOR: &str = "faulty_detector.c";
 const ESTIMATOR: &str = "faulty_estimator.c";
+const SEGMENTER: &str = "faulty_segmenter.c";
 const ANY: &str = "broken.c";
 
 const BROKEN: &[Broken] = &[
@@ -110,6 +111,11 @@ const BROKEN: &[Broken] = &[
         "sense",
         &["where the banner has 4.000 m × 2.000 m", "its centre at (i + 0.5, j + 0.5)"],
     ),
+    c(SEGMENTER, "-DFAULT_LABEL", "nothing", &["labels[0][0] = 200", "a class of the map, or 255"]),
+    c(SEGMENTER, "-DFAULT_STRIDE", "rows", &["padding behind each row changed the answer"]),
+    c(SEGMENTER, "-DFAULT_ROWS", "rows", &["behind the end of a row of labels", "step from row to row by row_bytes"]),
+    c(SEGMENTER, "-DFAULT_PAST", "outputs", &["labels was overrun", "stay inside"]),
+    c(SEGMENTER, "-DFAULT_MAP", "answers", &["nobody knows yet where the photo was taken"]),
     rust("panic-in-create", "settings", &["panicked in create: asked to panic in create at ", "return an error"]),
     rust("panic-in-score", "answers", &["panicked in score", "image.rs:", "return an error"]),
     rust("panic-in-drop", "settings", &["panicked in destroy: asked to panic in drop", "make it one that cannot fail"]),
@@ -201,7 +207,13 @@ fn every_broken_plugin_fails_with_what_is_wrong_and_what_to_do() {
 
 #[test]
 fn every_shipped_plugin_passes() {
-    for library in ["resurvey_class_difference", "resurvey_descriptors", "resurvey_semantic", "resurvey_skyline"] {
+    for library in [
+        "resurvey_class_difference",
+        "resurvey_descriptors",
+        "resurvey_palette",
+        "resurvey_semantic",
+        "resurvey_skyline",
+    ] {
         let (code, document) = check(&built(library), "60");
         assert_eq!((code, &document["ok"]), (0, &Value::Bool(true)), "{library}: {document:#}");
         assert_eq!(document["plugin"]["name"], library.trim_start_matches("resurvey_").replace('_', "-"));
@@ -214,7 +226,7 @@ fn plugins_in_c_and_rust_without_a_fault_pass() {
     let directory = tempfile::tempdir().unwrap();
     let mut sources = vec![Source::Rust("agreement")];
     if compiler().is_some() {
-        let right = ["matcher.c", MATCHER, DETECTOR, ESTIMATOR].map(|file| Source::C(file, "-DNOTHING"));
+        let right = ["matcher.c", MATCHER, DETECTOR, ESTIMATOR, SEGMENTER].map(|file| Source::C(file, "-DNOTHING"));
         sources.extend(right);
     }
     for (number, source) in sources.into_iter().enumerate() {

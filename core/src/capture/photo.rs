@@ -81,4 +81,17 @@ mod tests {
         }
         assert!(fits((4080, 3072), (960, 723)), "the height of the camera was rounded");
     }
+
+    /// A TIFF directory with one entry, as section 2 of TIFF 6.0 lays it out.
+    fn tiff(orientation: u16) -> Vec<u8> {
+        let [high, low] = orientation.to_be_bytes();
+        let entry = [0x01, 0x12, 0, 3, 0, 0, 0, 1, high, low, 0, 0];
+        [&b"MM\0*"[..], &[0, 0, 0, 8, 0, 1], &entry, &[0; 4]].concat()
+    }
+
+    #[test]
+    fn the_orientation_is_that_of_the_exif_and_upright_without() {
+        assert_eq!([1, 6, 8, 9].map(|orientation| exif::orientation(&tiff(orientation))), [1, 6, 8, 9]);
+        assert_eq!(exif::orientation(b"no picture"), 1);
+    }
 }

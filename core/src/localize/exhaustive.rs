@@ -1,9 +1,9 @@
 //! The exact search (Lee & Hsu, §3.4): every candidate's view, rendered and counted in full.
 
 use super::compare::{Comparer, ViewPhoto};
-use super::services::Listener;
 use super::world::World;
 use crate::capture::Capture;
+use crate::plugin::Listener;
 use crate::plugin::class_slots;
 use crate::render::SolidMask;
 use rayon::prelude::*;

@@ -5,22 +5,12 @@ use super::compare::{PositionPhoto, ViewPhoto};
 use crate::camera::{Camera, camera_from_world, world_from_camera};
 use crate::capture::Capture;
 use crate::crs::Crs;
-use crate::plugin::{ServiceError, Services, ViewImages, class_slots};
+use crate::plugin::{Listener, ServiceError, Services, ViewImages, class_slots};
 use crate::render::{RayCaster, SolidMask, view};
 use nalgebra::Vector3;
 use resurvey_schema::service::{ClassCounts, CompareRequest, Level, PanoramaRequest, RayHit};
 use resurvey_schema::{ClassTable, Descriptor, GridPoint, Pose, Wgs84};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-
-/// Where a run's messages go and whether it should end; the command line fills it in.
-pub trait Listener: Sync {
-    /// Takes a line for the log.
-    fn log(&self, level: Level, text: &str);
-    /// Takes how far the present stage is, 0–1.
-    fn progress(&self, fraction: f64);
-    /// Whether the run is to end.
-    fn cancelled(&self) -> bool;
-}
 
 /// Hears nothing and never cancels.
 pub struct Silent;

@@ -18,6 +18,7 @@ mod kinds;
 mod lend;
 mod line;
 mod open;
+mod photo_services;
 #[cfg(target_os = "linux")]
 mod process;
 #[cfg(not(target_os = "linux"))]
@@ -38,8 +39,9 @@ pub use input::{ComparisonInput, PhotoInput, ViewImages};
 pub use isolation::Isolation;
 pub use kinds::{Detector, Estimator, MakeView, Matcher, MatcherForm};
 pub use open::Plugin;
+pub use photo_services::PhotoServices;
 pub use process::{SERVE, serve};
 pub use registry::{Registry, SkippedFile};
 pub use segmenter::Segmenter;
-pub use services::{ServiceError, Services, class_slots};
+pub use services::{Listener, ServiceError, Services, class_slots};
 pub use settings::{Assignment, Setting, Settings, SettingsError, SettingsSchema, ValueType};

@@ -86,6 +86,16 @@ pub trait Services: Sync {
     fn cancelled(&self) -> bool;
 }
 
+/// Where a run's messages go and whether it should end; the command line fills it in.
+pub trait Listener: Sync {
+    /// Takes a line for the log.
+    fn log(&self, level: Level, text: &str);
+    /// Takes how far the present stage is, 0–1.
+    fn progress(&self, fraction: f64);
+    /// Whether the run is to end.
+    fn cancelled(&self) -> bool;
+}
+
 /// Counts per view in the comparisons: one more than the highest class index of `classes`.
 pub fn class_slots(classes: &ClassTable) -> usize {
     classes.iter().map(|class| usize::from(class.index.0) + 1).max().unwrap_or(0)

@@ -4,13 +4,13 @@ use super::super::error::PluginError;
 use super::super::info::Kind;
 use super::super::kinds::{Detector, Estimator, Matcher, MatcherForm};
 use super::super::open::Plugin;
+use super::super::photo_services::PhotoServices;
 use super::super::segmenter::Segmenter;
 use super::super::services::Services;
 use super::answer::Answer;
 use super::exhibit::Exhibit;
 use super::placeless::Behind;
 use super::report::Report;
-use crate::localize::PhotoServices;
 
 /// An instance of whatever kind, whose steps are reported.
 pub(super) struct Asked<'a> {

@@ -1,7 +1,6 @@
 //! What a segmenter has of the services of a trial: no more than in a run.
 
-use super::super::services::Services;
-use crate::localize::Listener;
+use super::super::services::{Listener, Services};
 use resurvey_schema::service::Level;
 
 /// Whoever listens behind `Services`.

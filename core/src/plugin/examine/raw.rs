@@ -5,6 +5,7 @@ use super::super::check::{self, Rules};
 use super::super::info::Kind;
 use super::super::lend::read_growing;
 use super::super::open::{Code, Plugin};
+use super::super::photo_services::PhotoServices;
 use super::super::results::{self, Collected, Collector};
 use super::super::service_table::ServiceTable;
 use super::super::services::Services;
@@ -16,7 +17,6 @@ use super::lent::{Host, Inputs, Layout, Lent, struct_bytes};
 use super::placeless::Behind;
 use super::report::Report;
 use crate::image::LabelImage;
-use crate::localize::PhotoServices;
 use resurvey_schema::ClassId;
 use resurvey_schema::abi::{
     self, ABI_MAJOR, ABI_MINOR, Declaration, Growing, STATUS_CANCELLED, STATUS_OK, STATUS_PANICKED, Status, Table, Text,

@@ -1,7 +1,7 @@
 //! The services of a call on a photo that has no place yet: a segmenter's.
 
-use super::services::Listener;
-use crate::plugin::{ServiceError, Services, ViewImages};
+use super::input::ViewImages;
+use super::services::{Listener, ServiceError, Services};
 use resurvey_schema::service::{ClassCounts, CompareRequest, Level, PanoramaRequest, RayHit};
 use resurvey_schema::{ClassTable, Descriptor, GridPoint, Pose, Wgs84};
 
