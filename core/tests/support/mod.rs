@@ -28,7 +28,7 @@ pub fn capture(case: &Path) -> (LabelImage, Camera, Pose) {
     let capture: CaptureFile = serde_json::from_str(&text).unwrap();
     let truth: serde_json::Value = serde_json::from_slice(&std::fs::read(case.join("truth.json")).unwrap()).unwrap();
     let pose: PoseFile = serde_json::from_value(truth["pose"].clone()).unwrap();
-    let png = std::fs::read(case.join(&capture.labels)).unwrap();
+    let png = std::fs::read(case.join(capture.labels.as_ref().unwrap())).unwrap();
     (labels(&png, &ClassTable::default()), Camera::from_file(&capture.camera).unwrap(), pose.into())
 }
 
