@@ -68,6 +68,24 @@ fn a_plugin_that_is_not_allowed_is_refused_by_its_digest() {
 }
 
 #[test]
+fn a_plugin_that_was_built_with_the_first_header_still_works() {
+    let bench = Bench::with_street();
+    // It comes before the header of today, whose guard then leaves that out.
+    let first = format!("{ROOT}/plugins/fixtures/c/abi-1.0/resurvey_plugin.h");
+    let Some(sha256) = plugin(&bench, "matcher.c", "first", &["-include", &first]) else { return };
+    let (capture, directory) = (street().path("capture/capture.json"), bench.path("plugins"));
+    let arguments = [text(&capture), "--matcher", "agreement", "--plugin-dir", text(&directory)];
+    for how in [&["--allow-plugin", sha256.as_str()][..], &["--allow-plugin", &sha256, "--in-process"]] {
+        let run = bench.run("localize", &[&arguments[..], how, &["--json"]].concat());
+        // 22: its score is a share of pixels, which the gate may find low.
+        assert!([0, 22].contains(&run.code), "{}", run.err);
+        let (found, truth) = (run.json(), &street().case.truth.json["pose"]);
+        let off = |key: &str| found["pose"][key].as_f64().unwrap() - truth[key].as_f64().unwrap();
+        assert!(off("easting").hypot(off("northing")) < 2.0, "{found}");
+    }
+}
+
+#[test]
 fn a_plugin_of_another_abi_is_refused_with_what_to_do() {
     let bench = Bench::with_street();
     let Some(sha256) = plugin(&bench, "broken.c", "broken", &["-DMAJOR=2"]) else { return };

@@ -54,7 +54,7 @@ fn a_banner_in_a_coloured_photo_is_found_as_with_labels() {
 
     let used: Vec<_> = document["plugins"].as_array().unwrap().iter().map(|used| &used["kind"]).collect();
     assert_eq!(used, ["segmenter", "matcher", "detector", "estimator"]);
-    assert_eq!(document["plugins"][0]["settings"], json!({ "majority_radius_px": 0, "max_delta_e": 15 }));
+    assert_eq!(document["plugins"][0]["settings"], json!({ "majority_radius_px": 0, "max_delta_e": 15.0 }));
     let replayed = shot.bench.json("replay", &["2"]);
     assert_eq!(replayed["same"], true, "the labels that were made were kept: {replayed:#}");
     shot.bench.run("replay", &["2", "--capture", &shot.capture]).refused(10, &["segmenter palette", "--keep-labels"]);
