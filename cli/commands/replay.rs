@@ -78,7 +78,9 @@ impl Tools {
         let (detector, estimator) = (detector?, estimator?);
         let mut found = matcher.as_ref().map(MatchingTool::used).transpose()?.unwrap_or_default();
         found.extend([detector.used()?, estimator.used()?]);
-        let builds = plugins.iter().map(|used| build(used, &found, any_build)).collect::<Result<_, _>>()?;
+        // The labels that a segmenter made are what was seen; it is not asked again.
+        let asked = plugins.iter().filter(|used| used.kind != "segmenter");
+        let builds = asked.map(|used| build(used, &found, any_build)).collect::<Result<_, _>>()?;
         Ok(Self { matcher, detector, estimator, builds })
     }
 }

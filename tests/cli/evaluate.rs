@@ -270,7 +270,7 @@ fn matchers_and_settings_that_cannot_be_are_refused_with_what_can() {
         "{}",
         twins.err
     );
-    refused(&["--matcher", "magic"], 11, &["magic", "edges, pixel, semantic, silhouette, skyline"]);
+    refused(&["--matcher", "magic"], 11, &["magic", "edges, palette, pixel, semantic, silhouette, skyline"]);
     refused(&["--updates", "--detector", "magic"], 11, &["magic", "class-difference"]);
     refused(&["--matcher", "descriptors"], 12, &["descriptors", "matcher"]);
     refused(&["--matcher", "semantic:dice"], 2, &["NAME:KEY=VALUE", "\"dice\""]);

@@ -72,7 +72,7 @@ fn names_that_nothing_has_are_exit_11_and_the_known_ones_are_listed() {
             command,
             &[capture, "--matcher", "magic"],
             11,
-            &["magic", "edges, pixel, semantic, silhouette, skyline"],
+            &["magic", "edges, palette, pixel, semantic, silhouette, skyline"],
         );
     }
     bench.refuses("update", &[capture, "--detector", "magic"], 11, &["class-difference"]);
