@@ -20,7 +20,7 @@ pub fn metadata() -> Value {
 }
 
 /// The arrows of `docs/architecture.md`: package, and the packages of this workspace that it is built from.
-pub const ARROWS: [(&str, &[&str]); 13] = [
+pub const ARROWS: [(&str, &[&str]); 14] = [
     (
         "resurvey",
         &[
@@ -29,6 +29,7 @@ pub const ARROWS: [(&str, &[&str]); 13] = [
             "resurvey-core",
             "resurvey-descriptors",
             "resurvey-edges",
+            "resurvey-palette",
             "resurvey-pixel",
             "resurvey-schema",
             "resurvey-semantic",
@@ -45,6 +46,7 @@ pub const ARROWS: [(&str, &[&str]); 13] = [
     ("resurvey-schema", &[]),
     ("resurvey-semantic", &["resurvey-plugin"]),
     ("resurvey-edges", &["resurvey-plugin"]),
+    ("resurvey-palette", &["resurvey-plugin"]),
     ("resurvey-pixel", &["resurvey-plugin"]),
     ("resurvey-silhouette", &["resurvey-plugin"]),
     ("resurvey-skyline", &["resurvey-plugin"]),
