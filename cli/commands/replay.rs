@@ -141,15 +141,7 @@ fn capture(
     }
     let kept = recorded.labels.map(|digest| map.label_image(digest)).transpose()?.flatten();
     let (Some(label_bytes), Some(camera), Some(prior)) = (kept, seen.camera, seen.prior) else {
-        let what = if seen.camera.is_none() { "the camera" } else { "the label image" };
-        return Err(Failure::new(
-            MISSING,
-            anyhow!(
-                "the map did not keep {what} of observation {}; give the capture: --capture CAPTURE.json (update --keep-labels \
-             keeps what replay needs)",
-                recorded.id
-            ),
-        ));
+        return Err(not_kept(recorded, segmenter));
     };
     let damaged = |error: &dyn std::fmt::Display| {
         Failure::new(crate::failure::MAP, anyhow!("{}: observation {}: {error}", map.path().display(), recorded.id))
@@ -158,6 +150,19 @@ fn capture(
         read_labels(&label_bytes, snapshot.classes(), &LabelReading::default()).map_err(|error| damaged(&error))?;
     let camera = Camera::new(camera).map_err(|error| damaged(&error))?;
     Ok(Capture { labels, label_bytes, camera, prior, taken_at: seen.taken_at, digest: seen.capture })
+}
+
+fn not_kept(recorded: &RecordedObservation, segmenter: Option<&PluginUse>) -> Failure {
+    let what = if recorded.observation.camera.is_none() { "the camera" } else { "the label image" };
+    let next = match segmenter {
+        Some(segmenter) => format!("the segmenter {} made it and is not run again", segmenter.name),
+        None => "give the capture: --capture CAPTURE.json".to_owned(),
+    };
+    let id = recorded.id;
+    let text = format!(
+        "the map did not keep {what} of observation {id}; {next} (update --keep-labels keeps what replay needs)"
+    );
+    Failure::new(MISSING, anyhow!(text))
 }
 
 /// What the plugins answer now.

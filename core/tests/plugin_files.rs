@@ -125,7 +125,7 @@ fn every_other_way_to_be_broken_has_its_gate_and_its_words() {
     let Some(fixtures) = fixtures() else { return };
     let cases: &[(&[&str], Stage, &str)] = &[
         (&["-DMIN_HOST=9"], Stage::Abi, "plugin needs a host of ABI 1.9, this host speaks 1.0 to 1.0"),
-        (&["-DKIND=4"], Stage::Abi, "plugin is of kind 4, this host knows 1 (matcher)"),
+        (&["-DKIND=9"], Stage::Abi, "plugin is of kind 9, this host knows 1 (matcher)"),
         (&["-DMAGIC={0}"], Stage::Header, "expected the letters RESURVEY, found \\x00"),
         (&["-DSIZE=64"], Stage::Header, "expected a declaration of at least 272 bytes, found 64"),
         (&["-DNAME=\"Not A Name\""], Stage::Header, "expected a name of a–z, 0–9 and dashes, found \"Not A Name\""),
@@ -135,6 +135,7 @@ fn every_other_way_to_be_broken_has_its_gate_and_its_words() {
         (&["-DENTRY_FAILS"], Stage::Entry, "its entry returned status 1: needs a licence"),
         (&["-DNO_SCORE"], Stage::Entry, "a matcher needs the function score or search, its table has none"),
         (&["-DKIND=2"], Stage::Entry, "a detector needs the function detect, its table has none"),
+        (&["-DKIND=4"], Stage::Entry, "a segmenter needs the function segment, its table has none"),
         (&["-DSCHEMA=\"[]\""], Stage::Settings, "settings schema: expected an object, found []"),
     ];
     for (index, (flags, stage, words)) in cases.iter().enumerate() {
