@@ -3,11 +3,12 @@
 use super::error::{Fault, StoreError};
 use super::feature_rows::last_fid;
 use super::forgotten::all_remains;
+use super::fsck;
 use super::index;
 use super::map_file::{MapFile, WriteFault};
 use super::operations::{deltas_of, operations_digest};
-use super::rows::{VersionRow, head};
-use crate::version::{Digest, Fid, VersionId, VersionRecord, version_hash};
+use super::rows::head;
+use crate::version::{Fid, VersionId};
 use jiff::Timestamp;
 use rusqlite::{Connection, named_params};
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,10 +44,14 @@ impl MapFile {
     }
 
     /// Forgets the versions before `before`, but for version 0, tagged ones and head, and removes what nobody uses any
-    /// more: all of it or nothing. Without `before` no version is forgotten.
+    /// more: all of it or nothing. Without `before` no version is forgotten. Of a damaged map nothing is: what seems to be
+    /// used by nobody may be what the damaged part asks for, and what proves the rest goes with what is forgotten.
     pub fn gc(&self, before: Option<VersionId>, now: Timestamp) -> Result<Forgetting, StoreError> {
         self.write(|connection| -> Result<Forgetting, WriteFault<StoreError>> {
             let plan = plan(connection, before)?;
+            if let Some(first) = fsck::damage(connection, &self.path)?.first() {
+                return Err(Fault::Damage(format!("{first}; nothing was forgotten or removed")).into());
+            }
             forget(connection, &plan, now)?;
             remove(connection, &plan)?;
             Ok(plan.forgetting())
@@ -65,7 +70,7 @@ impl MapFile {
 
 /// A state of a feature that no kept version has.
 pub(super) struct Unreachable {
-    pub(super) id: i64,
+    id: i64,
     pub(super) fid: Fid,
     pub(super) from: VersionId,
     bytes: u64,
@@ -99,7 +104,7 @@ fn plan(connection: &Connection, before: Option<VersionId>) -> Result<Plan, Faul
     if limit > head {
         return Err(StoreError::NoSuchVersion { version: limit, head }.into());
     }
-    let mut kept = kept(connection, head)?;
+    let mut kept = kept(connection)?;
     let tagged = tagged(connection)?;
     let is_spared = |version: &VersionId| version.0 == 0 || *version >= limit || tagged.contains(version);
     let forgotten: Vec<VersionId> = kept.iter().copied().filter(|version| !is_spared(version)).collect();
@@ -116,10 +121,13 @@ fn plan(connection: &Connection, before: Option<VersionId>) -> Result<Plan, Faul
 }
 
 /// Every version whose state is whole.
-fn kept(connection: &Connection, head: VersionId) -> Result<BTreeSet<VersionId>, Fault> {
+fn kept(connection: &Connection) -> Result<BTreeSet<VersionId>, Fault> {
     let remains = all_remains(connection)?;
     let is_kept = |version: &VersionId| remains.get(version).is_none_or(|remains| remains.has_state);
-    Ok((0..=head.0).map(VersionId).filter(is_kept).collect())
+    let mut statement = connection.prepare("SELECT version FROM version ORDER BY version")?;
+    let versions = statement.query_map([], |row| Ok(VersionId(row.get::<_, i64>(0)?.unsigned_abs())))?;
+    let versions = versions.collect::<Result<Vec<_>, _>>()?;
+    Ok(versions.into_iter().filter(is_kept).collect())
 }
 
 fn tagged(connection: &Connection) -> Result<BTreeSet<VersionId>, Fault> {
@@ -130,7 +138,7 @@ fn tagged(connection: &Connection) -> Result<BTreeSet<VersionId>, Fault> {
 
 /// States that no version has any more.
 pub(super) fn unreachable(connection: &Connection) -> Result<Vec<Unreachable>, Fault> {
-    unreachable_among(connection, &kept(connection, head(connection)?.version)?)
+    unreachable_among(connection, &kept(connection)?)
 }
 
 fn unreachable_among(connection: &Connection, kept: &BTreeSet<VersionId>) -> Result<Vec<Unreachable>, Fault> {
@@ -220,7 +228,7 @@ fn forget(connection: &Connection, plan: &Plan, now: Timestamp) -> Result<(), Fa
         let operations = match remembered.get(&version) {
             Some(_) if has_state => continue,
             Some(remains) => remains.operations,
-            None => proven_operations(connection, version)?,
+            None => operations_digest(connection, version, &deltas_of(connection, version)?)?,
         };
         connection.prepare_cached(SQL)?.execute(named_params! {
             ":version": version.0 as i64, ":has_state": has_state, ":operations": operations.0,
@@ -228,22 +236,6 @@ fn forget(connection: &Connection, plan: &Plan, now: Timestamp) -> Result<(), Fa
         })?;
     }
     Ok(())
-}
-
-/// Digest of what `version` did, held against its hash: of a damaged map nothing is forgotten.
-fn proven_operations(connection: &Connection, version: VersionId) -> Result<Digest, Fault> {
-    let sql = format!("SELECT {} FROM version WHERE version = :version ORDER BY version", VersionRow::COLUMNS);
-    let record = |version: u64| -> Result<VersionRecord, Fault> {
-        let mut statement = connection.prepare_cached(&sql)?;
-        let mut rows = statement.query(named_params! {":version": version as i64})?;
-        rows.next()?.map_or_else(|| Err(Fault::Damage(format!("version {version} is missing"))), VersionRow::read)
-    };
-    let (parent, own) = (record(version.0.saturating_sub(1))?, record(version.0)?);
-    let operations = operations_digest(connection, version, &deltas_of(connection, version)?)?;
-    if version_hash(Some(parent.hash), operations, own.evidence) != own.hash {
-        return Err(Fault::Damage(format!("version {version} is not what its hash says; nothing was forgotten")));
-    }
-    Ok(operations)
 }
 
 fn remove(connection: &Connection, plan: &Plan) -> Result<(), Fault> {

@@ -2,7 +2,7 @@
 
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
-use super::index::{build_beside, rebuild};
+use super::index::{Source, build_beside, rebuild};
 use super::rows::{VersionRow, check_classes, insert_classes};
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
@@ -286,7 +286,7 @@ fn migrate(connection: &Connection) -> Result<(), WriteFault<StoreError>> {
         connection.execute_batch(migration)?;
     }
     if format < INDEX_FORMAT {
-        rebuild(connection, BTreeMap::new())?;
+        rebuild(connection, &Source::read(connection)?, BTreeMap::new())?;
     }
     connection.pragma_update(None, "user_version", MIGRATIONS.len() as i32)?;
     Ok(())

@@ -2,6 +2,7 @@
 //! project is here.
 
 mod backend;
+mod blobs;
 mod commit;
 mod commit_error;
 mod conflict;
@@ -14,7 +15,6 @@ mod feature_rows;
 mod forgotten;
 mod fsck;
 mod gc;
-
 mod index;
 mod interface;
 mod logs;

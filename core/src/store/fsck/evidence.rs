@@ -1,19 +1,16 @@
 //! Evidence, proposals and tags.
 
-use super::features::each_blob;
 use super::problem::Findings;
 use crate::store::error::Fault;
 use crate::version::{Digest, Observation, is_tag_name, read_proposal_bytes};
 use rusqlite::{Connection, Row};
 
-/// Observations are what their digest and their version say; label images belong to one.
+/// Observations are what their digest and their version say.
 pub(super) fn observations(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
     const ROWS: &str = "SELECT o.id, o.version, o.capture, o.labels, o.decision, o.body, o.digest, v.evidence
         FROM observation AS o LEFT JOIN version AS v ON v.version = o.version ORDER BY o.id";
     const MISSING: &str = "SELECT v.version FROM version AS v LEFT JOIN observation AS o ON o.version = v.version
         WHERE v.evidence IS NOT NULL AND o.id IS NULL ORDER BY v.version";
-    const IMAGES: &str = "SELECT digest, bytes, EXISTS (SELECT 1 FROM observation AS o WHERE o.labels = l.digest)
-        AS is_used FROM label_image AS l ORDER BY rowid";
     let mut statement = connection.prepare(ROWS)?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
@@ -36,7 +33,7 @@ pub(super) fn observations(connection: &Connection, findings: &mut Findings) -> 
     while let Some(row) = rows.next()? {
         findings.add(format!("version {}", row.get::<_, i64>(0)?), "its observation is missing");
     }
-    each_blob(connection, IMAGES, "label image", "no observation names it", findings)
+    Ok(())
 }
 
 /// Whether `body` is an observation that says the same as the columns made from it.

@@ -1,10 +1,10 @@
-//! Features: their states, life spans, index and geometry.
+//! Features: their states, life spans and index.
 
 use super::problem::Findings;
 use crate::store::error::Fault;
-use crate::store::index::{Flaw, flaws};
+use crate::store::index::{Flaw, Source, flaws};
 use crate::store::rows::classes_at;
-use crate::version::{Digest, FeatureState, VersionId};
+use crate::version::{FeatureState, VersionId};
 use resurvey_schema::ClassTable;
 use rusqlite::{Connection, Row};
 use std::collections::BTreeMap;
@@ -88,39 +88,9 @@ pub(super) fn life_spans(connection: &Connection, findings: &mut Findings) -> Re
 
 /// The index holds the box and the versions of every row, and nothing else.
 pub(super) fn index(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
-    for flaw in flaws(connection)?.0 {
+    for flaw in flaws(connection, &Source::read(connection)?)?.0 {
         let (Flaw::Wrong { place, detail } | Flaw::Stray { place, detail }) = flaw;
         findings.add(place, detail);
-    }
-    Ok(())
-}
-
-/// Geometry is what its digest says, and some object uses it.
-pub(super) fn geometry(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
-    const SQL: &str = "SELECT digest, bytes, EXISTS (SELECT 1 FROM feature_version AS f WHERE f.geometry = g.digest
-            AND f.geometry IS NOT NULL) AS is_used FROM geometry AS g ORDER BY rowid";
-    each_blob(connection, SQL, "geometry", "no object uses it", findings)
-}
-
-/// Checks rows (digest, bytes, is_used).
-pub(super) fn each_blob(
-    connection: &Connection,
-    sql: &str,
-    name: &str,
-    unused: &str,
-    findings: &mut Findings,
-) -> Result<(), Fault> {
-    let mut statement = connection.prepare(sql)?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        let digest = Digest(row.get(0)?);
-        let found = Digest::of(row.get_ref(1)?.as_blob().map_err(rusqlite::Error::from)?);
-        if found != digest {
-            findings.add(format!("{name} {digest}"), format!("its bytes have digest {found}"));
-        }
-        if !row.get::<_, bool>(2)? {
-            findings.add(format!("{name} {digest}"), unused);
-        }
     }
     Ok(())
 }

@@ -6,9 +6,10 @@ use crate::store::forgotten::{all_remains, remains_of};
 use crate::store::gc::{Unreachable, unreachable};
 use crate::store::operations::{deltas_of, operations_digest};
 use crate::store::rows::{VersionRow, classes_at, head};
-use crate::version::{BoxMm, Counts, Delta, VersionId, VersionKind, VersionRecord, version_hash};
+use crate::version::{BoxMm, Counts, Delta, Digest, VersionId, VersionKind, VersionRecord, version_hash};
 use resurvey_schema::ClassTable;
 use rusqlite::Connection;
+use std::collections::BTreeSet;
 
 /// Every class table can be read, and none drops a class of the one before or changes its kind.
 pub(super) fn classes(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
@@ -79,26 +80,62 @@ fn check_contents(
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let place = || format!("version {}", record.version);
-    let operations = match remains_of(connection, record.version)? {
-        Some(remains) => remains.operations,
-        None => match deltas_of(connection, record.version) {
-            Ok(deltas) => {
-                check_sums(record, &deltas, findings);
-                operations_digest(connection, record.version, &deltas)?
-            }
-            // A state that cannot be read is found by the check of the states.
-            Err(Fault::Damage(_)) => {
-                findings.add(place(), "cannot be recomputed, because a state cannot be read");
-                return Ok(());
-            }
-            Err(fault) => return Err(fault),
-        },
+    let Some(Recomputed { operations, deltas }) = recomputed(connection, record.version)? else {
+        findings.add(place(), "cannot be recomputed, because a state or its class table cannot be read");
+        return Ok(());
     };
+    if let Some(deltas) = deltas {
+        check_sums(record, &deltas, findings);
+    }
     let hash = version_hash(last.map(|last| last.hash), operations, record.evidence);
     if hash != record.hash {
         findings.add(place(), format!("has hash {}, its operations and evidence give {hash}", record.hash));
     }
     Ok(())
+}
+
+/// What a version did.
+struct Recomputed {
+    /// Digest of all of it.
+    operations: Digest,
+    /// What it did to features; `None` where that is forgotten.
+    deltas: Option<Vec<Delta>>,
+}
+
+/// What `version` did; `None` where it cannot be read.
+fn recomputed(connection: &Connection, version: VersionId) -> Result<Option<Recomputed>, Fault> {
+    if let Some(remains) = remains_of(connection, version)? {
+        return Ok(Some(Recomputed { operations: remains.operations, deltas: None }));
+    }
+    let read = deltas_of(connection, version).and_then(|deltas| {
+        Ok(Recomputed { operations: operations_digest(connection, version, &deltas)?, deltas: Some(deltas) })
+    });
+    match read {
+        // What it is is found by the checks of states and classes.
+        Err(Fault::Damage(_)) => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+/// Versions that are not what their hash says.
+pub(in crate::store) fn doubtful(connection: &Connection) -> Result<BTreeSet<VersionId>, Fault> {
+    let mut statement = connection.prepare(&format!("SELECT {} FROM version ORDER BY version", VersionRow::COLUMNS))?;
+    let mut rows = statement.query([])?;
+    let (mut parent, mut doubtful) = (None, BTreeSet::new());
+    while let Some(row) = rows.next()? {
+        let version = VersionId(row.get::<_, i64>(0)?.unsigned_abs());
+        let Ok(VersionRecord { evidence, hash, .. }) = VersionRow::read(row) else {
+            doubtful.insert(version);
+            parent = None;
+            continue;
+        };
+        let is_so = |done: Recomputed| version_hash(parent, done.operations, evidence) == hash;
+        if !recomputed(connection, version)?.is_some_and(is_so) {
+            doubtful.insert(version);
+        }
+        parent = Some(hash);
+    }
+    Ok(doubtful)
 }
 
 fn check_sums(record: &VersionRecord, deltas: &[Delta], findings: &mut Findings) {

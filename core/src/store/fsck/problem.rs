@@ -1,10 +1,11 @@
 //! Running all checks and collecting what they find.
 
-use super::{evidence, features, file, history};
+use super::{blobs, evidence, features, file, history};
 use crate::store::error::{Fault, StoreError};
 use crate::store::map_file::MapFile;
 use rusqlite::Connection;
 use std::fmt;
+use std::path::Path;
 
 /// One thing that does not hold.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,10 +51,10 @@ impl Findings {
     }
 }
 
-type Check = fn(&Connection, &mut Findings) -> Result<(), Fault>;
+type Check = (&'static str, fn(&Connection, &mut Findings) -> Result<(), Fault>);
 
-/// Every check by its name, the ground before what stands on it.
-const CHECKS: [(&str, Check); 14] = [
+/// Every check of what must be true, by its name, the ground before what stands on it.
+const CHECKS: [Check; 15] = [
     ("sqlite", file::sqlite),
     ("schema", file::schema),
     ("references", file::references),
@@ -61,34 +62,49 @@ const CHECKS: [(&str, Check); 14] = [
     ("states", features::states),
     ("life-spans", features::life_spans),
     ("index", features::index),
-    ("geometry", features::geometry),
+    ("geometry", blobs::geometry),
     ("classes", history::classes),
     ("versions", history::versions),
     ("forgotten", history::forgotten),
     ("observations", evidence::observations),
+    ("observations", blobs::label_images),
     ("proposals", evidence::proposals),
     ("tags", evidence::tags),
 ];
+
+/// Checks for what nobody uses, which harms nobody either.
+const LEFT_OVER: [Check; 2] = [("geometry", blobs::unused_geometry), ("observations", blobs::unused_label_images)];
 
 impl MapFile {
     /// Checks everything that must hold in the map as it is now; empty when all is well. Reads the whole file.
     pub fn fsck(&self) -> Result<Vec<Problem>, StoreError> {
         self.read(|connection| {
-            let mut problems = Vec::new();
-            for (name, check) in CHECKS {
-                let mut findings = Findings { check: name, problems: Vec::new(), left_out: 0 };
-                if let Err(fault) = check(connection, &mut findings) {
-                    // Damage that keeps a check from going on is itself what it found.
-                    match fault.at(&self.path) {
-                        StoreError::Damaged { detail, .. } | StoreError::Internal { detail, .. } => {
-                            findings.add("map", detail);
-                        }
-                        error => return Err(error.into()),
-                    }
-                }
-                problems.extend(findings.finish());
-            }
+            let mut problems = damage(connection, &self.path)?;
+            problems.extend(found_by(&LEFT_OVER, connection, &self.path)?);
             Ok(problems)
         })
     }
+}
+
+/// All that is not true in the map at `path`; what nobody uses is none of it.
+pub(in crate::store) fn damage(connection: &Connection, path: &Path) -> Result<Vec<Problem>, Fault> {
+    found_by(&CHECKS, connection, path)
+}
+
+fn found_by(checks: &[Check], connection: &Connection, path: &Path) -> Result<Vec<Problem>, Fault> {
+    let mut problems = Vec::new();
+    for (name, check) in checks {
+        let mut findings = Findings { check: name, problems: Vec::new(), left_out: 0 };
+        if let Err(fault) = check(connection, &mut findings) {
+            // Damage that keeps a check from going on is itself what it found.
+            match fault.at(path) {
+                StoreError::Damaged { detail, .. } | StoreError::Internal { detail, .. } => {
+                    findings.add("map", detail);
+                }
+                error => return Err(error.into()),
+            }
+        }
+        problems.extend(findings.finish());
+    }
+    Ok(problems)
 }

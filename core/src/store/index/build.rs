@@ -5,41 +5,73 @@ use super::cell::Cell;
 use super::origin::IndexOrigin;
 use super::write::insert;
 use crate::store::error::Fault;
-use crate::version::FeatureState;
+use crate::version::{FeatureState, VersionId};
 use resurvey_schema::sql::INDEX_BESIDE;
 use rusqlite::{Connection, Row};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// The columns that [`life`] reads, of `feature_version` as `f`.
+/// The columns that [`Source::expected`] reads, of `feature_version` as `f`.
 pub(super) const LIFE_COLUMNS: &str = "f.id, f.fid, f.from_version, f.to_version, f.state";
 
-/// The cell and life that the index should have of a row; `None` where its state has no box in it.
-pub(super) fn life(row: &Row, origin: Option<IndexOrigin>) -> Result<Option<(Cell, Life)>, Fault> {
-    let (first, to): (i64, Option<i64>) = (row.get(2)?, row.get(3)?);
-    let state = FeatureState::from_bytes(row.get_ref(4)?.as_blob().map_err(rusqlite::Error::from)?);
-    let bounds = state.ok().and_then(|state| state.bounds().ok());
-    let ends = bounds.and_then(|bounds| origin?.to_index(&bounds));
-    let last = to.map_or(LIVE, |to| to.saturating_sub(1));
-    let id = row.get(0)?;
-    Ok(ends.map(|ends| (Cell::of(&ends), Life { id, ends, first, last })))
+/// What the index is made from beside the rows of features.
+pub(in crate::store) struct Source {
+    pub(in crate::store) origin: Option<IndexOrigin>,
+    /// Versions that are not what their hash says: rows that begin or end with them prove nothing.
+    pub(in crate::store) doubtful: BTreeSet<VersionId>,
+}
+
+/// What the index should have of a row.
+pub(super) enum Expected {
+    At(Cell, Life),
+    /// The row does not say: its state has no box, its span is none, or it is in doubt.
+    Unknown,
+    /// The box does not fit around the origin.
+    Outside,
+}
+
+impl Source {
+    /// The origin of this map, and all its rows.
+    pub(in crate::store) fn read(connection: &Connection) -> Result<Self, Fault> {
+        Ok(Self { origin: IndexOrigin::read(connection)?, doubtful: BTreeSet::new() })
+    }
+
+    /// What the index should have of a row of [`LIFE_COLUMNS`].
+    pub(super) fn expected(&self, row: &Row) -> Result<Expected, Fault> {
+        let (id, first, to): (i64, i64, Option<i64>) = (row.get(0)?, row.get(2)?, row.get(3)?);
+        let last = to.map_or(LIVE, |to| to.saturating_sub(1));
+        let is_span = (0..=last).contains(&first) && (to.is_none() || last < LIVE);
+        let is_in_doubt = |version: i64| self.doubtful.contains(&VersionId(version.unsigned_abs()));
+        let state = FeatureState::from_bytes(row.get_ref(4)?.as_blob().map_err(rusqlite::Error::from)?);
+        let bounds = state.ok().and_then(|state| state.bounds().ok());
+        let Some(bounds) = bounds.filter(|_| is_span && !is_in_doubt(first) && !to.is_some_and(is_in_doubt)) else {
+            return Ok(Expected::Unknown);
+        };
+        let ends = self.origin.and_then(|origin| origin.to_index(&bounds));
+        Ok(ends.map_or(Expected::Outside, |ends| Expected::At(Cell::of(&ends), Life { id, ends, first, last })))
+    }
 }
 
 /// Makes the index of a map that has another one, or none, for this connection alone.
 pub(in crate::store) fn build_beside(connection: &Connection) -> Result<(), Fault> {
     connection.execute_batch(INDEX_BESIDE)?;
-    rebuild(connection, BTreeMap::new())
+    rebuild(connection, &Source::read(connection)?, BTreeMap::new())
 }
 
-/// Makes the index anew. `kept` are lives of rows whose state says nothing of their box.
-pub(in crate::store) fn rebuild(connection: &Connection, kept: BTreeMap<i64, Life>) -> Result<(), Fault> {
-    let origin = IndexOrigin::read(connection)?;
+/// Makes the index anew. `kept` are lives of rows that do not say where they belong.
+pub(in crate::store) fn rebuild(
+    connection: &Connection,
+    source: &Source,
+    kept: BTreeMap<i64, Life>,
+) -> Result<(), Fault> {
     connection.execute("DELETE FROM feature_index", [])?;
     let mut lives: Vec<(Cell, Life)> = kept.into_values().map(|life| (Cell::of(&life.ends), life)).collect();
     let sql = format!("SELECT {LIFE_COLUMNS} FROM feature_version AS f ORDER BY f.id");
     let mut statement = connection.prepare(&sql)?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
-        lives.extend(life(row, origin)?.filter(|(_, life)| life.first <= life.last));
+        if let Expected::At(cell, life) = source.expected(row)? {
+            lives.push((cell, life));
+        }
     }
     lives.sort_unstable_by_key(|(cell, life)| (*cell, life.id));
     for of_cell in lives.chunk_by(|a, b| a.0 == b.0) {

@@ -1,9 +1,8 @@
 //! Holding the index against the rows of features.
 
 use super::block::{Block, LIVE, Life};
-use super::build::{LIFE_COLUMNS, life};
+use super::build::{Expected, LIFE_COLUMNS, Source};
 use super::cell::Cell;
-use super::origin::IndexOrigin;
 use super::search::{Ids, each_cell};
 use crate::store::error::Fault;
 use rusqlite::{Connection, named_params};
@@ -17,17 +16,13 @@ pub(in crate::store) enum Flaw {
     Stray { place: String, detail: String },
 }
 
-/// A row and what the index should have of it; nothing where the state has no box.
-struct Expected {
-    place: String,
-    life: Option<(Cell, Life)>,
-}
-
-/// Where the index differs from what the rows say, and what it has of rows whose state has no box.
-pub(in crate::store) fn flaws(connection: &Connection) -> Result<(Vec<Flaw>, BTreeMap<i64, Life>), Fault> {
-    let mut check =
-        Check { connection, origin: IndexOrigin::read(connection)?, seen: BTreeSet::new(), flaws: Vec::new() };
-    let mut boxless = BTreeMap::new();
+/// Where the index differs from what the rows say, and what it has of rows that do not say where they belong.
+pub(in crate::store) fn flaws(
+    connection: &Connection,
+    source: &Source,
+) -> Result<(Vec<Flaw>, BTreeMap<i64, Life>), Fault> {
+    let mut check = Check { connection, source, seen: BTreeSet::new(), flaws: Vec::new() };
+    let mut unknown = BTreeMap::new();
     each_cell(connection, |cell, blocks| {
         let mut readable = Vec::new();
         for block in blocks {
@@ -37,16 +32,16 @@ pub(in crate::store) fn flaws(connection: &Connection) -> Result<(Vec<Flaw>, BTr
                 Err(fault) => return Err(fault),
             }
         }
-        boxless.extend(check.cell(cell, &readable)?);
+        unknown.extend(check.cell(cell, &readable)?);
         Ok(())
     })?;
     check.missing()?;
-    Ok((check.flaws, boxless))
+    Ok((check.flaws, unknown))
 }
 
 struct Check<'c> {
     connection: &'c Connection,
-    origin: Option<IndexOrigin>,
+    source: &'c Source,
     /// Rows that are in the cell where they belong.
     seen: BTreeSet<i64>,
     flaws: Vec<Flaw>,
@@ -61,21 +56,23 @@ impl Check<'_> {
         self.flaws.push(Flaw::Wrong { place, detail });
     }
 
-    /// Holds the blocks of a cell against the rows they name; returns what they have of rows without a box.
+    /// Holds the blocks of a cell against the rows they name; returns what they have of rows that do not say.
     fn cell(&mut self, cell: Cell, blocks: &[Block]) -> Result<BTreeMap<i64, Life>, Fault> {
         let named: BTreeSet<i64> = blocks.iter().flat_map(|block| &block.lives).map(|life| life.id).collect();
         let rows = self.rows(&named)?;
-        let mut boxless = BTreeMap::new();
+        let mut unknown = BTreeMap::new();
         for id in named {
             let found = || blocks.iter().filter_map(|block| life_in(block, id));
             match rows.get(&id) {
                 None => self.stray(format!("index row {id}"), "belongs to no feature"),
-                Some(Expected { life: None, .. }) => boxless.extend(found().next_back().map(|life| (id, life))),
-                Some(Expected { place, life: Some((own, _)) }) if *own != cell => {
+                Some((_, Expected::Unknown)) => unknown.extend(found().next_back().map(|life| (id, life))),
+                // It is seen nowhere, and named with the rows that are missing.
+                Some((_, Expected::Outside)) => {}
+                Some((place, Expected::At(own, _))) if *own != cell => {
                     let detail = format!("the index has it in cell {}, expected {}", cell.number(), own.number());
                     self.wrong(place.clone(), detail);
                 }
-                Some(Expected { place, life: Some((_, life)) }) => {
+                Some((place, Expected::At(_, life))) => {
                     self.seen.insert(id);
                     if let Some(detail) = difference(blocks, life) {
                         self.wrong(place.clone(), detail);
@@ -83,18 +80,18 @@ impl Check<'_> {
                 }
             }
         }
-        self.seen.extend(boxless.keys());
-        Ok(boxless)
+        self.seen.extend(unknown.keys());
+        Ok(unknown)
     }
 
-    fn rows(&self, ids: &BTreeSet<i64>) -> Result<BTreeMap<i64, Expected>, Fault> {
+    fn rows(&self, ids: &BTreeSet<i64>) -> Result<BTreeMap<i64, (String, Expected)>, Fault> {
         let sql = format!("SELECT {LIFE_COLUMNS} FROM {} ORDER BY f.id", Ids::ROWS);
         let mut statement = self.connection.prepare_cached(&sql)?;
         let ids = Ids::of(ids.iter().copied());
         let mut rows = statement.query(named_params! {":ids": ids.json()})?;
         let mut expected = BTreeMap::new();
         while let Some(row) = rows.next()? {
-            expected.insert(row.get(0)?, Expected { place: place(row)?, life: life(row, self.origin)? });
+            expected.insert(row.get(0)?, (place(row)?, self.source.expected(row)?));
         }
         Ok(expected)
     }
@@ -108,9 +105,11 @@ impl Check<'_> {
             if self.seen.contains(&row.get(0)?) {
                 continue;
             }
-            // Where a state without a box should be is not known; the check of the states names it.
-            if life(row, self.origin)?.is_some_and(|(_, life)| life.first <= life.last) {
-                self.wrong(place(row)?, "is not in the index".to_owned());
+            match self.source.expected(row)? {
+                Expected::At(..) => self.wrong(place(row)?, "is not in the index".to_owned()),
+                Expected::Outside => self.wrong(place(row)?, "does not fit around the origin of the index".to_owned()),
+                // Where it should be is not known; the checks of states and versions name it.
+                Expected::Unknown => {}
             }
         }
         Ok(())
@@ -130,7 +129,7 @@ fn difference(blocks: &[Block], life: &Life) -> Option<String> {
     if let Some(first) = blocks.first().filter(|first| first.since > life.first) {
         return Some(format!("the index of its cell begins with version {}", first.since));
     }
-    let ends = blocks.iter().skip(1).map(|next| next.since - 1).chain([LIVE]);
+    let ends = blocks.iter().skip(1).map(|next| next.since.saturating_sub(1)).chain([LIVE]);
     blocks.iter().zip(ends).find_map(|(block, until)| {
         let (found, expected) = (life_in(block, life.id), block.expected(life, until));
         let text = |life: Option<Life>| life.map_or("nothing".to_owned(), |life| format!("{life:?}"));

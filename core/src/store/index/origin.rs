@@ -1,6 +1,7 @@
 //! From boxes in the map frame to the 32-bit millimetres of the index, and the order in which rows are written.
 
 use crate::store::error::Fault;
+use crate::store::rows::read_box;
 use crate::version::BoxMm;
 use rusqlite::{Connection, OptionalExtension, named_params};
 
@@ -33,9 +34,18 @@ impl IndexOrigin {
         Self { e0: middle(0), n0: middle(1) }
     }
 
-    /// Writes it down, once for the map.
+    /// The origin that was chosen for the first features of this map; `None` where it never had any.
+    pub(in crate::store) fn first(connection: &Connection) -> Result<Option<Self>, Fault> {
+        const SQL: &str = "SELECT e0, e1, n0, n1, h0, h1 FROM version WHERE e0 IS NOT NULL ORDER BY version LIMIT 1";
+        let mut statement = connection.prepare(SQL)?;
+        let mut rows = statement.query([])?;
+        let envelope = rows.next()?.map_or(Ok(None), read_box)?;
+        Ok(envelope.as_ref().map(Self::choose))
+    }
+
+    /// Writes it down.
     pub(in crate::store) fn write(&self, connection: &Connection) -> Result<(), Fault> {
-        const SQL: &str = "UPDATE meta SET index_e0 = :e0, index_n0 = :n0 WHERE index_e0 IS NULL";
+        const SQL: &str = "UPDATE meta SET index_e0 = :e0, index_n0 = :n0";
         connection.execute(SQL, named_params! {":e0": self.e0, ":n0": self.n0})?;
         Ok(())
     }
@@ -57,12 +67,15 @@ impl IndexOrigin {
     /// The box whose ends in the index are `ends`.
     pub(in crate::store) fn box_at(self, ends: &IndexBox) -> Option<BoxMm> {
         let [e0, e1, n0, n1, h0, h1] = *ends;
-        BoxMm::from_mm([e0 + self.e0, n0 + self.n0, h0], [e1 + self.e0, n1 + self.n0, h1])
+        let (e, n) = (|end: i64| end.saturating_add(self.e0), |end: i64| end.saturating_add(self.n0));
+        BoxMm::from_mm([e(e0), n(n0), h0], [e(e1), n(n1), h1])
     }
 
     fn shift(self, bounds: &BoxMm) -> IndexBox {
         let ([e0, n0, h0], [e1, n1, h1]) = (bounds.min(), bounds.max());
-        [e0 - self.e0, e1 - self.e0, n0 - self.n0, n1 - self.n0, h0, h1]
+        // An origin that nobody chose, in a damaged map, may be anywhere; what is clipped there fits into no index.
+        let (e, n) = (|end: i64| end.saturating_sub(self.e0), |end: i64| end.saturating_sub(self.n0));
+        [e(e0), e(e1), n(n0), n(n1), h0, h1]
     }
 }
 

@@ -13,7 +13,7 @@ fn versions(numbers: &[u64]) -> Vec<VersionId> {
 }
 
 /// Versions 1 to 5: a chair that moves with each.
-fn moving() -> Scratch {
+pub(super) fn moving() -> Scratch {
     let scratch = Scratch::new();
     scratch.add(0, &[chair(0.0)]).unwrap();
     for version in 1..5 {
