@@ -8,6 +8,7 @@ pub const MIGRATIONS: &[&str] = &[
     include_str!("../sql/0001_map.sql"),
     include_str!("../sql/0002_history.sql"),
     include_str!("../sql/0003_index.sql"),
+    include_str!("../sql/0004_seals.sql"),
 ];
 
 /// The index of the newest format for one connection to an older map.

@@ -9,6 +9,7 @@ use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
 use super::plan::{check_new_classes, check_request, check_states, plan};
 use super::rows::{VersionRow, classes_at, head, insert_classes};
+use super::seal;
 use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
@@ -79,6 +80,7 @@ pub(super) fn make_version(
         insert_classes(connection, plan.record.version, classes)?;
     }
     insert_looked_at(connection, plan.record.version, transaction.viewed_region.as_ref())?;
+    seal::VERSION.seal(connection, &(plan.record.version.0 as i64))?;
     insert_geometries(connection, transaction)?;
     write_rows(connection, &plan, &live)?;
     Ok(plan.record)

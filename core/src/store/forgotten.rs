@@ -1,7 +1,7 @@
 //! Versions of which gc removed something: what is left of them, and who may still ask for them.
 
 use super::error::{Fault, StoreError};
-use super::map_file::format_of;
+use super::migrate::format_of;
 use super::states::check_version;
 use crate::version::{Digest, VersionId};
 use rusqlite::{Connection, OptionalExtension, named_params};

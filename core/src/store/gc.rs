@@ -5,6 +5,7 @@ use super::feature_rows::last_fid;
 use super::forgotten::all_remains;
 use super::fsck;
 use super::index;
+use super::kept_states::write_kept_states;
 use super::map_file::{MapFile, WriteFault};
 use super::operations::{deltas_of, operations_digest};
 use super::rows::head;
@@ -52,8 +53,11 @@ impl MapFile {
             if let Some(first) = fsck::damage(connection, &self.path)?.first() {
                 return Err(Fault::Damage(format!("{first}; nothing was forgotten or removed")).into());
             }
-            forget(connection, &plan, now)?;
-            remove(connection, &plan)?;
+            if !plan.forgetting().is_empty() {
+                forget(connection, &plan, now)?;
+                remove(connection, &plan)?;
+                write_kept_states(connection)?;
+            }
             Ok(plan.forgetting())
         })
     }

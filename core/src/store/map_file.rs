@@ -2,15 +2,16 @@
 
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
-use super::index::{Source, build_beside, rebuild};
+use super::index::build_beside;
+use super::migrate::{INDEX_FORMAT, migrate};
 use super::rows::{VersionRow, check_classes, insert_classes};
+use super::seal;
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, named_params};
-use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -18,8 +19,6 @@ use std::time::Duration;
 
 /// Value of `format` in the table `meta`.
 pub(super) const FORMAT: &str = "resurvey.map/1";
-/// The first format whose index this program reads.
-const INDEX_FORMAT: usize = 3;
 /// How long a writer waits for another.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Page cache of a connection, KiB.
@@ -96,7 +95,7 @@ impl MapFile {
         }
         map.use_write_ahead_log()?;
         if (format as usize) < MIGRATIONS.len() {
-            map.write(migrate)?;
+            map.write(|connection| -> Result<(), WriteFault<StoreError>> { Ok(migrate(connection)?) })?;
         }
         Ok(map)
     }
@@ -273,25 +272,6 @@ impl From<CommitError> for WriteFault<CommitError> {
     }
 }
 
-/// The number of migrations that the file has had.
-pub(super) fn format_of(connection: &Connection) -> Result<usize, Fault> {
-    let format: i32 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-    Ok(format.max(0) as usize)
-}
-
-/// Applies the migrations that the file has not had.
-fn migrate(connection: &Connection) -> Result<(), WriteFault<StoreError>> {
-    let format = format_of(connection)?;
-    for migration in MIGRATIONS.iter().skip(format) {
-        connection.execute_batch(migration)?;
-    }
-    if format < INDEX_FORMAT {
-        rebuild(connection, &Source::read(connection)?, BTreeMap::new())?;
-    }
-    connection.pragma_update(None, "user_version", MIGRATIONS.len() as i32)?;
-    Ok(())
-}
-
 fn fill(connection: &Connection, new: &NewMap, now: Timestamp) -> Result<(), WriteFault<StoreError>> {
     const SQL: &str = "INSERT INTO meta (only_row, format, map_id, crs, vertical_datum, created_at)
         VALUES (1, :format, :map_id, :crs, :vertical_datum, :created_at)";
@@ -304,8 +284,10 @@ fn fill(connection: &Connection, new: &NewMap, now: Timestamp) -> Result<(), Wri
             ":created_at": now.as_microsecond(),
         },
     )?;
+    seal::META.seal(connection, &1)?;
     let record = first_version(new, now);
     VersionRow::insert(connection, &record)?;
+    seal::VERSION.seal(connection, &0)?;
     insert_classes(connection, record.version, &new.classes)?;
     Ok(())
 }

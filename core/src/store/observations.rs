@@ -3,6 +3,7 @@
 use super::error::{Fault, StoreError};
 use super::map_file::{MapFile, WriteFault};
 use super::rows::{digest, timestamp};
+use super::seal;
 use super::states::check_version;
 use crate::version::{Digest, Observation, PluginBuild, VersionId};
 use jiff::Timestamp;
@@ -167,7 +168,9 @@ impl<'o> Evidence<'o> {
             ":decision": self.observation.decision.name(), ":labels": labels.map(|digest| digest.0),
             ":body": self.body, ":digest": self.digest.0,
         })?;
-        Ok(connection.last_insert_rowid().unsigned_abs())
+        let id = connection.last_insert_rowid();
+        seal::OBSERVATION.seal(connection, &id)?;
+        Ok(id.unsigned_abs())
     }
 }
 
@@ -195,8 +198,9 @@ pub(super) fn link(connection: &Connection, id: u64, version: VersionId) -> Resu
         WHERE id = :id ORDER BY id";
     let linked =
         connection.prepare_cached(LINK)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
-    if linked == 0 {
-        connection.prepare_cached(COPY)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    if linked > 0 {
+        return seal::OBSERVATION.seal(connection, &(id as i64));
     }
-    Ok(())
+    connection.prepare_cached(COPY)?.execute(named_params! {":version": version.0 as i64, ":id": id as i64})?;
+    seal::OBSERVATION.seal(connection, &connection.last_insert_rowid())
 }

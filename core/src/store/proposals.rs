@@ -7,6 +7,7 @@ use super::map_file::{MapFile, WriteFault};
 use super::observations::{Evidence, digest_of, link};
 use super::plan::{check_request, check_states};
 use super::rows::{box_columns, classes_at, head, read_box, timestamp};
+use super::seal;
 use crate::version::{
     BoxMm, Delta, FeatureState, Observation, UpdateTransaction, VersionId, VersionKind, proposal_bytes,
     read_proposal_bytes,
@@ -211,7 +212,9 @@ fn insert(
         ":operations": proposal_bytes(&transaction.deltas, &transaction.additions),
         ":observation": observation.map(|id| id as i64),
     })?;
-    Ok(connection.last_insert_rowid().unsigned_abs())
+    let id = connection.last_insert_rowid();
+    seal::PROPOSAL.seal(connection, &id)?;
+    Ok(id.unsigned_abs())
 }
 
 fn one(connection: &Connection, id: u64) -> Result<Proposal, Fault> {
@@ -243,7 +246,7 @@ fn decide(
         ":by": decision.by, ":note": decision.note, ":version": version.map(|version| version.0 as i64),
         ":id": id as i64,
     })?;
-    Ok(())
+    seal::PROPOSAL.seal(connection, &(id as i64))
 }
 
 fn select(connection: &Connection, sql: &str, parameters: &[(&str, &dyn ToSql)]) -> Result<Vec<Proposal>, Fault> {

@@ -4,6 +4,7 @@ use super::error::{Fault, StoreError};
 use super::forgotten::check_state;
 use super::map_file::WriteFault;
 use super::rows::timestamp;
+use super::seal;
 use crate::version::{VersionId, is_tag_name};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
@@ -23,7 +24,7 @@ pub(super) fn tag(
     }
     let now = now.as_microsecond();
     connection.execute(SQL, named_params! {":name": name, ":version": version.0 as i64, ":now": now})?;
-    Ok(())
+    Ok(seal::TAG.seal(connection, &name)?)
 }
 
 /// Refuses what cannot name a version.

@@ -15,6 +15,7 @@ mod operations;
 mod record;
 mod revision;
 mod transaction;
+mod whole_state;
 
 pub use box_mm::{BoxMm, InvalidBox};
 pub use build::PluginBuild;
@@ -31,3 +32,4 @@ pub use record::{Feature, VersionRecord};
 pub(crate) use revision::is_tag_name;
 pub use revision::{InvalidRevision, Revision, parse_moment};
 pub use transaction::{Fid, UpdateTransaction, VersionId, VersionKind};
+pub use whole_state::WholeState;

@@ -3,7 +3,8 @@
 use super::problem::Findings;
 use crate::store::error::Fault;
 use crate::store::index::IndexOrigin;
-use crate::store::map_file::{FORMAT, format_of};
+use crate::store::map_file::FORMAT;
+use crate::store::migrate::format_of;
 use resurvey_schema::sql::MIGRATIONS;
 use rusqlite::Connection;
 use std::collections::BTreeMap;

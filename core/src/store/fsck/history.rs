@@ -4,8 +4,11 @@ use super::problem::Findings;
 use crate::store::error::Fault;
 use crate::store::forgotten::{all_remains, remains_of};
 use crate::store::gc::{Unreachable, unreachable};
+use crate::store::kept_states::kept_states;
+use crate::store::migrate::format_of;
 use crate::store::operations::{deltas_of, operations_digest};
 use crate::store::rows::{VersionRow, classes_at, head};
+use crate::store::seal::SEALED_FORMAT;
 use crate::version::{BoxMm, Counts, Delta, Digest, VersionId, VersionKind, VersionRecord, version_hash};
 use resurvey_schema::ClassTable;
 use rusqlite::Connection;
@@ -117,13 +120,14 @@ fn recomputed(connection: &Connection, version: VersionId) -> Result<Option<Reco
     }
 }
 
-/// Versions that are not what their hash says.
+/// Versions that are not what their hash says, or, where the way to a state is forgotten, what the digest of that says.
 pub(in crate::store) fn doubtful(connection: &Connection) -> Result<BTreeSet<VersionId>, Fault> {
     let mut statement = connection.prepare(&format!("SELECT {} FROM version ORDER BY version", VersionRow::COLUMNS))?;
     let mut rows = statement.query([])?;
-    let (mut parent, mut doubtful) = (None, BTreeSet::new());
+    let (mut parent, mut all, mut doubtful) = (None, Vec::new(), BTreeSet::new());
     while let Some(row) = rows.next()? {
         let version = VersionId(row.get::<_, i64>(0)?.unsigned_abs());
+        all.push(version);
         let Ok(VersionRecord { evidence, hash, .. }) = VersionRow::read(row) else {
             doubtful.insert(version);
             parent = None;
@@ -134,6 +138,13 @@ pub(in crate::store) fn doubtful(connection: &Connection) -> Result<BTreeSet<Ver
             doubtful.insert(version);
         }
         parent = Some(hash);
+    }
+    if format_of(connection)? >= SEALED_FORMAT {
+        for kept in kept_states(connection)? {
+            if !kept.found(connection).is_ok_and(|found| kept.digest == Some(found)) {
+                doubtful.extend(all.iter().filter(|version| (kept.before < **version) && (**version <= kept.version)));
+            }
+        }
     }
     Ok(doubtful)
 }

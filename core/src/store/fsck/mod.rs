@@ -6,6 +6,7 @@ mod features;
 mod file;
 mod history;
 mod problem;
+mod seals;
 
 pub(super) use file::complaints as complaints_of_sqlite;
 pub(super) use history::doubtful;

@@ -1,6 +1,6 @@
 //! Running all checks and collecting what they find.
 
-use super::{blobs, evidence, features, file, history};
+use super::{blobs, evidence, features, file, history, seals};
 use crate::store::error::{Fault, StoreError};
 use crate::store::map_file::MapFile;
 use rusqlite::Connection;
@@ -54,7 +54,7 @@ impl Findings {
 type Check = (&'static str, fn(&Connection, &mut Findings) -> Result<(), Fault>);
 
 /// Every check of what must be true, by its name, the ground before what stands on it.
-const CHECKS: [Check; 15] = [
+const CHECKS: [Check; 17] = [
     ("sqlite", file::sqlite),
     ("schema", file::schema),
     ("references", file::references),
@@ -66,10 +66,12 @@ const CHECKS: [Check; 15] = [
     ("classes", history::classes),
     ("versions", history::versions),
     ("forgotten", history::forgotten),
+    ("forgotten", seals::states),
     ("observations", evidence::observations),
     ("observations", blobs::label_images),
     ("proposals", evidence::proposals),
     ("tags", evidence::tags),
+    ("seals", seals::seals),
 ];
 
 /// Checks for what nobody uses, which harms nobody either.

@@ -6,6 +6,9 @@ use crate::store::StoreError;
 use crate::version::{BoxMm, Delta, Digest};
 use std::path::PathBuf;
 
+/// The format that maps have after they are opened for writing.
+const NEWEST: i32 = 4;
+
 fn fixture(format: u32) -> PathBuf {
     PathBuf::from(format!("{}/../tests/fixtures/map-format-{format}.rsv", env!("CARGO_MANIFEST_DIR")))
 }
@@ -55,7 +58,7 @@ const TURNS: u64 = 6;
 fn the_map_of_format_3_opens_with_the_blocks_of_its_index() {
     let (_directory, path) = copy(3);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 3));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), NEWEST));
     let blocks = "SELECT max(count) FROM (SELECT count(*) AS count FROM feature_index GROUP BY cell) ORDER BY 1";
     let most: i64 = map.read(|connection| Ok(connection.query_row(blocks, [], |row| row.get(0))?)).unwrap();
     assert!(most > 1, "no cell has a second block");
@@ -70,7 +73,7 @@ fn the_map_of_format_3_opens_with_the_blocks_of_its_index() {
 fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
     let (_directory, path) = copy(2);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 3));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), NEWEST));
     let gone = StoreError::Forgotten { version: VersionId(3), next: VersionId(4) };
     assert_eq!(map.snapshot(VersionId(3)).err(), Some(gone));
     let chair_then = map.snapshot(VersionId(1)).unwrap().feature(Fid(2)).unwrap().state;
@@ -98,7 +101,7 @@ fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() 
     drop(reader);
     assert_eq!(std::fs::read(&path).unwrap(), before);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.info().unwrap().format, map.fsck()), (3, Ok(Vec::new())));
+    assert_eq!((map.info().unwrap().format, map.fsck()), (NEWEST, Ok(Vec::new())));
     map.gc(Some(VersionId(4)), at(9)).unwrap();
     assert_eq!(map.fsck(), Ok(Vec::new()));
 }

@@ -191,8 +191,8 @@ fn a_life_span_that_is_still_asked_for_cannot_be_deleted() {
         "UPDATE forgotten SET operations = zeroblob(32)",
         "UPDATE forgotten SET last_fid = 0",
         "UPDATE forgotten SET has_state = 1",
-        "INSERT INTO forgotten VALUES (2, 0, zeroblob(32), 9, 0)",
-        "INSERT INTO forgotten VALUES (5, 0, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (2, 0, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (5, 0, zeroblob(32), 9, 0)",
     ] {
         assert!(raw.execute_batch(sql).is_err(), "{sql}");
     }

@@ -170,21 +170,27 @@ const DAMAGE: &[(&str, &str)] = &[
     ),
     // Forgotten versions.
     (
-        "INSERT INTO forgotten VALUES (2, 0, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (2, 0, zeroblob(32), 9, 0)",
         "forgotten: version 3: follows a forgotten version and does not say so",
     ),
     (
-        "INSERT INTO forgotten VALUES (2, 1, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (2, 1, zeroblob(32), 9, 0)",
         "forgotten: version 2: is cut off from version 1, which is",
     ),
-    ("INSERT INTO forgotten VALUES (2, 1, zeroblob(32), 9, 0)", "versions: version 2: has hash"),
-    ("INSERT INTO forgotten VALUES (4, 0, zeroblob(32), 9, 0)", "forgotten: version 4: is the newest and forgotten"),
     (
-        "INSERT INTO forgotten VALUES (1, 0, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (2, 1, zeroblob(32), 9, 0)",
+        "versions: version 2: has hash",
+    ),
+    (
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (4, 0, zeroblob(32), 9, 0)",
+        "forgotten: version 4: is the newest and forgotten",
+    ),
+    (
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (1, 0, zeroblob(32), 9, 0)",
         "forgotten: tag \"surveyed\": names version 1, which is",
     ),
     (
-        "INSERT INTO forgotten VALUES (1, 0, zeroblob(32), 9, 0), (2, 0, zeroblob(32), 9, 0)",
+        "INSERT INTO forgotten (version, has_state, operations, last_fid, forgotten_at) VALUES (1, 0, zeroblob(32), 9, 0), (2, 0, zeroblob(32), 9, 0)",
         "forgotten: feature 2 from version 1: is in no version that is kept",
     ),
     ("INSERT INTO looked_at VALUES (9, 0, 0, 0, 0, 0, 0)", "references: looked_at 9: refers to a row of version"),

@@ -12,6 +12,7 @@ mod observed;
 mod open;
 mod repair;
 mod review;
+mod seal;
 mod undo;
 
 use super::conformance::{Subject, at, banner, chair, content, moves, new_map, play, transaction};

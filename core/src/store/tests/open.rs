@@ -35,7 +35,7 @@ fn a_newer_format_is_refused_by_both_numbers() {
     let scratch = Scratch::new();
     scratch.map.connection.pragma_update(None, "user_version", 7).unwrap();
     let error = open_error(scratch.map.path());
-    assert!(matches!(error, StoreError::NewerFormat { found: 7, supported: 3, .. }), "{error}");
+    assert!(matches!(error, StoreError::NewerFormat { found: 7, supported: 4, .. }), "{error}");
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn another_writer_is_waited_for_and_then_named() {
 fn a_map_says_what_its_coordinates_mean() {
     let scratch = Scratch::new();
     let info = MapFile::open(scratch.map.path()).unwrap().info().unwrap();
-    assert_eq!((info.map_id, info.frame, info.created_at, info.format), ("test".into(), new_map().frame, at(0), 3));
+    assert_eq!((info.map_id, info.frame, info.created_at, info.format), ("test".into(), new_map().frame, at(0), 4));
 }
 
 #[test]
