@@ -127,6 +127,13 @@ pub fn version(record: &VersionRecord) -> Value {
     })
 }
 
+/// Says in the document of a request that it was sent before.
+pub fn say_repeated(document: &mut Value, repeated: bool) {
+    if repeated {
+        document["repeated"] = json!(true);
+    }
+}
+
 /// A feature as `query` shows it.
 pub fn feature(feature: &Feature, classes: &ClassTable) -> Result<Map<String, Value>, Failure> {
     let mut fields = Map::new();

@@ -172,6 +172,7 @@ impl From<CommitError> for Failure {
                 Self { document: Some(Box::new(document)), ..failure }
             }
             CommitError::NothingToRevert { .. } => Self::new(NOTHING, error),
+            CommitError::OtherRequest { .. } | CommitError::OtherProposal { .. } => Self::new(CONFLICT, error),
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
         }

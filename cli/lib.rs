@@ -10,6 +10,7 @@ mod matching;
 mod prior;
 mod region;
 mod report;
+mod request;
 mod segment;
 mod tools;
 

@@ -3,13 +3,15 @@
 use super::crs_of;
 use crate::args::{Import, UpAxis};
 use crate::console::Console;
+use crate::document;
 use crate::failure::Failure;
+use crate::request::Request;
 use jiff::Timestamp;
 use resurvey_core::crs::{Crs, LocalOrigin};
 use resurvey_core::image::LabelReading;
-use resurvey_core::mesh::{ClassMap, ImportOptions, Imported, Object, Up, encode_mesh, import_model};
-use resurvey_core::store::{History, MapFile};
-use resurvey_core::version::{BoxMm, FeatureState, UpdateTransaction, VersionKind};
+use resurvey_core::mesh::{ClassMap, ImportOptions, ImportReport, Imported, Object, Up, encode_mesh, import_model};
+use resurvey_core::store::{History, Made, MapFile};
+use resurvey_core::version::{BoxMm, Digest, FeatureState, UpdateTransaction, VersionKind};
 use resurvey_schema::{ClassTable, GridPoint};
 use serde_json::json;
 
@@ -19,8 +21,15 @@ const FARTHEST_COLOUR: f64 = 442.0;
 /// Adds the objects of all files as one version.
 pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
+    let key = options.retry.idempotency_key.as_deref();
+    let request = key.map(|_| request(options)).transpose()?;
+    let repeated = map.repeated(key, (VersionKind::Import, request))?;
     let head = map.head()?;
-    let snapshot = map.snapshot(head)?;
+    // Of a retry the report is that of the first time, so the classes are.
+    let snapshot = match repeated.map(|made| map.snapshot(made)) {
+        Some(Ok(then)) => then,
+        _ => map.snapshot(head)?,
+    };
     let crs = crs_of(&map)?;
     let how = import_options(options, snapshot.classes())?;
     let message = options.message.clone().unwrap_or_else(|| {
@@ -29,7 +38,8 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     });
     let mut transaction = UpdateTransaction::new(head, VersionKind::Import, &options.author, message);
     transaction.observed_at = options.observed_at;
-    transaction.idempotency_key.clone_from(&options.retry.idempotency_key);
+    transaction.idempotency_key = key.map(ToOwned::to_owned);
+    transaction.request = request;
     let mut reports = Vec::new();
     let stage = console.stage("import");
     for file in &options.files {
@@ -43,9 +53,15 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
         }
         reports.push((file.display().to_string(), imported.report));
     }
-    let version = map.commit(&transaction, Timestamp::now())?;
+    let made = map.commit_once(&transaction, Timestamp::now())?;
     console.finish(&stage);
-    for (file, report) in &reports {
+    print(made, &reports, console)
+}
+
+/// Prints what was read of each file, and the version.
+fn print(made: Made, reports: &[(String, ImportReport)], console: &mut Console<'_>) -> Result<u8, Failure> {
+    let version = made.version;
+    for (file, report) in reports {
         for warning in &report.warnings {
             console.message(&format!("{file}: {warning}"));
         }
@@ -62,9 +78,11 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
                 })
             })
             .collect();
-        console.document(&json!({ "version": version.0, "files": files }))?;
+        let mut document = json!({ "version": version.0, "files": files });
+        document::say_repeated(&mut document, made.repeated);
+        console.document(&document)?;
     } else {
-        for (file, report) in &reports {
+        for (file, report) in reports {
             let (objects, triangles, textures) = (report.objects, report.triangles, report.textures);
             console.line(format_args!(
                 "{file}: {} with {objects} objects, {triangles} triangles, {textures} label textures",
@@ -74,6 +92,28 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
         console.line(format_args!("version {version}"))?;
     }
     Ok(0)
+}
+
+/// The models, and how they are read.
+fn request(options: &Import) -> Result<Digest, Failure> {
+    let mut request = Request::of("import");
+    for file in &options.files {
+        request = request.with_file("file", Some(file))?;
+    }
+    let up = options.up.map(|up| match up {
+        UpAxis::Y => "y",
+        UpAxis::Z => "z",
+    });
+    let request = request
+        .with_numbers("origin", options.origin.as_ref().map(<[f64; 3]>::as_slice))
+        .with("crs", options.crs.as_ref())
+        .with("up", up)
+        .with("rotate", Some(options.rotate))
+        .with_file("map-classes", options.map_classes.as_deref())?
+        .with("nearest-colour", options.nearest_colour)
+        .with("void-index", options.void_index)
+        .with("observed-at", options.observed_at);
+    Ok(request.digest())
 }
 
 fn import_options(options: &Import, classes: &ClassTable) -> Result<ImportOptions, Failure> {

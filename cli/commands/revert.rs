@@ -3,11 +3,13 @@
 use super::crs_of;
 use crate::args::Revert;
 use crate::console::Console;
+use crate::document;
 use crate::failure::{Failure, NOTHING};
 use crate::region;
+use crate::request::Request;
 use jiff::Timestamp;
-use resurvey_core::store::{self, History, MapFile};
-use resurvey_core::version::{PluginBuild, VersionId};
+use resurvey_core::store::{self, History, Made, MapFile, StoreError};
+use resurvey_core::version::{Digest, PluginBuild, Revision, VersionId, VersionKind};
 use serde_json::{Value, json};
 
 /// Undoes one version by a new one, or all that a plugin build did by one for each.
@@ -19,13 +21,21 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
         author: options.author.clone(),
         message: options.message.clone(),
         idempotency_key: options.retry.idempotency_key.clone(),
+        request: Some(request(options)?),
     };
     match (&options.by_plugin, &options.revision) {
         (Some(build), _) => all_of(&map, build, &wish, console),
         (None, Some(revision)) => {
-            wish.version = map.resolve(revision)?;
-            let version = map.revert(&wish, Timestamp::now())?;
-            let document = undone(&map, wish.version, version)?;
+            let made = match map.repeated(wish.idempotency_key.as_deref(), (VersionKind::Revert, wish.request))? {
+                // Of a retry the revision may be another by now, or forgotten.
+                Some(version) => Made { version, repeated: true },
+                None => {
+                    wish.version = map.resolve(revision)?;
+                    map.revert_once(&wish, Timestamp::now())?
+                }
+            };
+            let mut document = undone(&map, made.version)?;
+            document::say_repeated(&mut document, made.repeated);
             if console.is_json() {
                 console.document(&document)?;
             } else {
@@ -37,14 +47,31 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
 }
 
+/// What is to be undone, as it is called, and where.
+fn request(options: &Revert) -> Result<Digest, Failure> {
+    let revision = options.revision.as_deref().map(|text| {
+        Ok::<_, StoreError>(match Revision::parse(text)? {
+            Revision::Number(version) => version.to_string(),
+            _ => text.to_owned(),
+        })
+    });
+    let request = Request::of("revert").with("revision", revision.transpose()?);
+    Ok(request.with("by-plugin", options.by_plugin.as_ref()).with_region(&options.region).digest())
+}
+
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let versions = map.versions_by(build)?;
+    let mut versions = map.versions_by(build)?;
     let done = map.revert_all(&versions, wish, Timestamp::now())?;
-    let documents =
-        done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;
+    if let Some((_, first)) = done.undone.first() {
+        // What the build did since the first time is not what this undid.
+        versions.retain(|version| version < first);
+    }
+    let documents = done.undone.iter().map(|(_, version)| undone(map, *version)).collect::<Result<Vec<_>, _>>()?;
     if console.is_json() {
-        console
-            .document(&json!({ "plugin": build.to_string(), "versions_by_plugin": versions, "reverted": documents }))?;
+        let mut document =
+            json!({ "plugin": build.to_string(), "versions_by_plugin": versions, "reverted": documents });
+        document::say_repeated(&mut document, done.repeated);
+        console.document(&document)?;
     } else {
         for document in &documents {
             console.line(words(document))?;
@@ -56,10 +83,12 @@ fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mu
     Ok(if documents.is_empty() { NOTHING } else { 0 })
 }
 
-fn undone(map: &MapFile, reverts: VersionId, version: VersionId) -> Result<Value, Failure> {
-    let counts = map.version(version)?.counts;
+/// What `version` undid.
+fn undone(map: &MapFile, version: VersionId) -> Result<Value, Failure> {
+    let record = map.version(version)?;
+    let counts = record.counts;
     Ok(json!({
-        "reverts": reverts.0, "version": version.0,
+        "reverts": record.reverts.map(|reverts| reverts.0), "version": version.0,
         "added": counts.added, "modified": counts.modified, "removed": counts.removed,
     }))
 }

@@ -52,7 +52,8 @@ impl Run<'_> {
             .collect();
         let evidence = Observation { decision: Decision::Proposed, ..evidence.clone() };
         let proposals = self.map.propose_each(&proposed, &evidence, now)?;
-        let waiting = Committed { decision: Decision::Proposed, version: None, fids: Vec::new(), proposals };
+        let waiting =
+            Committed { decision: Decision::Proposed, version: None, fids: Vec::new(), proposals, repeated: false };
         let Review::Confirm(captures) = review else { return Ok(waiting) };
 
         let confirmed = self.confirmed(&waiting.proposals, captures)?;
@@ -97,9 +98,19 @@ impl Run<'_> {
     }
 }
 
-/// What was printed when the same key was used for the first time, as far as the map knows it; `None` for a new key.
-pub(super) fn repeated(map: &MapFile, key: Option<&str>, path: &Path) -> Result<Option<Value>, Failure> {
-    let Some(version) = key.map_or(Ok(None), |key| map.made_with(key))? else { return Ok(None) };
+/// What was printed when the same capture was sent with this key for the first time, as far as the map knows it; `None` for
+/// a new key. `photo` is what a segmenter reads, if any.
+pub(super) fn repeated(
+    map: &MapFile,
+    key: Option<&str>,
+    path: &Path,
+    photo: Option<&Path>,
+) -> Result<Option<Value>, Failure> {
+    if key.is_none() {
+        return Ok(None);
+    }
+    let asked = (VersionKind::Update, Some(Capture::digest_of(path, photo)?));
+    let Some(version) = map.repeated(key, asked)? else { return Ok(None) };
     let record = map.version(version)?;
     let snapshot = map.snapshot(map.head()?)?;
     let sides = Sides { before: snapshot.classes(), after: snapshot.classes() };

@@ -18,7 +18,7 @@ use resurvey_core::crs::Crs;
 use resurvey_core::localize::{GateLimits, Located, Matching, SceneServices, World, localize};
 use resurvey_core::plugin::{Detector, Estimator, Kind, PluginInfo};
 use resurvey_core::render::{inside_solid, view};
-use resurvey_core::store::{History, MapFile};
+use resurvey_core::store::{History, Made, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
     BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction, VersionId,
@@ -191,7 +191,8 @@ impl Run<'_> {
         reports: Option<&mut Reports>,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
-        if let Some(document) = repeated(self.map, self.recording.idempotency_key, path)? {
+        let photo = prior.photo.as_deref().filter(|_| tools.segmenting.is_some());
+        if let Some(document) = repeated(self.map, self.recording.idempotency_key, path, photo)? {
             if !console.is_json() {
                 console.line(format_args!("{}: committed before, version {}", path.display(), document["version"]))?;
             }
@@ -344,11 +345,12 @@ impl Run<'_> {
         transaction.viewed_region = outcome.viewed_region;
         transaction.evidence = Some(evidence);
         transaction.idempotency_key = self.recording.idempotency_key.map(ToOwned::to_owned);
+        transaction.request = Some(capture.digest);
         add_changes(&mut transaction, &outcome.resolution.changes);
-        let version = self.map.commit(&transaction, now)?;
+        let Made { version, repeated } = self.map.commit_once(&transaction, now)?;
         let changes = self.map.changes_of(version)?;
         let fids = changes.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
-        Ok(Committed { decision, version: Some(version), fids, proposals: Vec::new() })
+        Ok(Committed { decision, version: Some(version), fids, proposals: Vec::new(), repeated })
     }
 
     fn evidence(
@@ -423,6 +425,7 @@ impl Run<'_> {
         if !committed.proposals.is_empty() {
             document["proposals"] = json!(committed.proposals);
         }
+        document::say_repeated(&mut document, committed.repeated);
         if !console.is_json() {
             summary(path, &document, outcome, console)?;
         }
@@ -436,11 +439,13 @@ pub(super) struct Committed {
     pub(super) version: Option<VersionId>,
     pub(super) fids: Vec<u64>,
     pub(super) proposals: Vec<u64>,
+    /// Whether the same request made the version before.
+    pub(super) repeated: bool,
 }
 
 impl Committed {
     fn nothing(decision: Decision) -> Self {
-        Self { decision, version: None, fids: Vec::new(), proposals: Vec::new() }
+        Self { decision, version: None, fids: Vec::new(), proposals: Vec::new(), repeated: false }
     }
 }
 

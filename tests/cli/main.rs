@@ -27,6 +27,7 @@ mod plugin_install;
 mod priors;
 mod provenance;
 mod reports;
+mod retries;
 mod reviews;
 mod segmenters;
 mod table_v;

@@ -36,6 +36,15 @@ impl Capture {
         RoughCapture::read(path, &PriorSource::Capture, classes, crs)?.settled_without_map()
     }
 
+    /// The digest of the capture at `path`, whose labels a segmenter makes of `photo`, or else come from the file that the
+    /// capture names.
+    pub fn digest_of(path: &Path, photo: Option<&Path>) -> Result<Digest, CaptureError> {
+        let (file, text) = read_file(path)?;
+        let source = photo.map_or_else(|| label_path(path, &file), |photo| Ok(photo.to_owned()))?;
+        let bytes = std::fs::read(&source).map_err(|error| CaptureError::Io { path: source, source: error })?;
+        Ok(digest(&text, Digest::of(&bytes)))
+    }
+
     /// The labels and camera of `path`, with a prior that says nothing: somebody else knows it.
     pub fn labelled(path: &Path, classes: &ClassTable) -> Result<Self, CaptureError> {
         let file_and_text = read_file(path)?;
@@ -57,7 +66,7 @@ impl Capture {
         if found != expected {
             return Err(CaptureError::Size { labels: label_path, capture: path.to_owned(), found, expected });
         }
-        let digest = Digest::of(&[Digest::of(text).0, digest.0].concat());
+        let digest = self::digest(text, digest);
         Ok(Self { labels, label_bytes, camera, prior, taken_at, digest })
     }
 }
@@ -75,8 +84,7 @@ pub(super) struct Labelling {
 impl Labelling {
     /// The label image that `file`, read from `capture`, names.
     pub(super) fn beside(capture: &Path, file: &CaptureFile, classes: &ClassTable) -> Result<Self, CaptureError> {
-        let Some(name) = &file.labels else { return Err(CaptureError::NoLabels { capture: capture.to_owned() }) };
-        let path = capture.parent().unwrap_or(Path::new("")).join(name);
+        let path = label_path(capture, file)?;
         let label_bytes = std::fs::read(&path).map_err(|source| CaptureError::Io { path: path.clone(), source })?;
         let labels = read_labels(&label_bytes, classes, &LabelReading::default())
             .map_err(|source| ImageError::InFile { path: path.clone(), source: Box::new(source) })?;
@@ -89,6 +97,17 @@ impl Labelling {
         let label_bytes = write_label_png(&labels, classes)?;
         Ok(Self { path, labels, label_bytes, digest })
     }
+}
+
+/// The label image that `file`, read from `capture`, names.
+fn label_path(capture: &Path, file: &CaptureFile) -> Result<PathBuf, CaptureError> {
+    let name = file.labels.as_ref().ok_or_else(|| CaptureError::NoLabels { capture: capture.to_owned() })?;
+    Ok(capture.parent().unwrap_or(Path::new("")).join(name))
+}
+
+/// The digest of a capture, over `capture.json` and the digest of the file that the labels come from.
+fn digest(text: &[u8], labels: Digest) -> Digest {
+    Digest::of(&[Digest::of(text).0, labels.0].concat())
 }
 
 const UNKNOWN: Prior = Prior {

@@ -1,12 +1,12 @@
 //! The map file as a [`History`].
 
-use super::commit::{commit, version_with};
+use super::commit::{commit, request_of, version_with};
 use super::commit_error::CommitError;
 use super::differences::{changes, changes_in};
 use super::error::StoreError;
 use super::forgotten::check_state;
 use super::index;
-use super::interface::History;
+use super::interface::{History, Made};
 use super::logs::{all_records, record, records_in};
 use super::map_file::MapFile;
 use super::observed::features_observed;
@@ -39,6 +39,10 @@ impl History for MapFile {
 
     fn made_with(&self, key: &str) -> Result<Option<VersionId>, StoreError> {
         self.read(|connection| version_with(connection, key))
+    }
+
+    fn request_of(&self, version: VersionId) -> Result<Option<Digest>, StoreError> {
+        self.read(|connection| request_of(connection, version))
     }
 
     fn classes(&self, version: VersionId) -> Result<ClassTable, StoreError> {
@@ -97,7 +101,7 @@ impl History for MapFile {
         })
     }
 
-    fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
+    fn commit_once(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<Made, CommitError> {
         commit(self, transaction, now)
     }
 

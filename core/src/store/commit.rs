@@ -4,8 +4,11 @@ use super::commit_error::CommitError;
 use super::conflict::{check_conflicts, live_rows};
 use super::error::Fault;
 use super::feature_rows::{insert_geometries, last_fid, write_rows};
+use super::interface::{History, Made};
+use super::logs::record;
 use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
+use super::migrate::format_of;
 use super::observations::Evidence;
 use super::plan::{check_new_classes, check_request, check_states, plan};
 use super::rows::{VersionRow, classes_at, head, insert_classes};
@@ -14,6 +17,9 @@ use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, Ver
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
 
+/// The first format that knows what was asked for with a key.
+const REQUEST_FORMAT: usize = 4;
+
 type Refused = WriteFault<CommitError>;
 
 fn refuse<T>(error: CommitError) -> Result<T, Refused> {
@@ -21,18 +27,19 @@ fn refuse<T>(error: CommitError) -> Result<T, Refused> {
 }
 
 /// Makes the next version of everything in `transaction`, or refuses it and changes nothing.
-pub(super) fn commit(map: &MapFile, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
+pub(super) fn commit(map: &MapFile, transaction: &UpdateTransaction, now: Timestamp) -> Result<Made, CommitError> {
     let evidence = transaction.evidence.as_ref().map(Evidence::of).transpose()?;
     let digest = evidence.as_ref().map(|evidence| evidence.digest);
+    let asked = (transaction.kind, transaction.request);
     map.write(|connection| {
-        if let Some(made) = made_before(connection, transaction)? {
-            return Ok(made);
+        if let Some(version) = map.repeated(transaction.idempotency_key.as_deref(), asked)? {
+            return Ok(Made { version, repeated: true });
         }
         let record = make_unseen_version(connection, transaction, digest, now)?;
         if let Some(evidence) = evidence {
             evidence.insert(connection, transaction.base, Some(record.version), record.committed_at)?;
         }
-        Ok(record.version)
+        Ok(Made { version: record.version, repeated: false })
     })
 }
 
@@ -70,12 +77,14 @@ pub(super) fn make_version(
     now: Timestamp,
 ) -> Result<VersionRecord, Refused> {
     let head = head(connection)?;
+    check_key(connection, transaction)?;
     check(connection, transaction, head.version)?;
     let live = live_rows(connection, &transaction.deltas)?;
     check_conflicts(connection, transaction, &live, head.version)?;
     let state = |fid: Fid| live.get(&fid).map(|row| row.state.clone());
     let plan = plan(transaction, state, last_fid(connection)?, &head, (evidence, now))?;
-    VersionRow::insert(connection, &plan.record)?;
+    let request = transaction.request.filter(|_| transaction.idempotency_key.is_some());
+    VersionRow::insert(connection, &plan.record, request)?;
     if let Some(classes) = &transaction.classes {
         insert_classes(connection, plan.record.version, classes)?;
     }
@@ -86,16 +95,20 @@ pub(super) fn make_version(
     Ok(plan.record)
 }
 
+/// Refuses a key that made another version.
+fn check_key(connection: &Connection, transaction: &UpdateTransaction) -> Result<(), Refused> {
+    let Some(key) = &transaction.idempotency_key else { return Ok(()) };
+    let Some(version) = version_with(connection, key)? else { return Ok(()) };
+    let made = (record(connection, version)?.kind, request_of(connection, version)?);
+    let asked = (transaction.kind, transaction.request);
+    refuse(CommitError::OtherRequest { key: key.clone(), version, made, asked })
+}
+
 /// Refuses what does not fit the map at its newest version, whatever else changed since the base.
 pub(super) fn check(connection: &Connection, transaction: &UpdateTransaction, head: VersionId) -> Result<(), Refused> {
     check_request(transaction, head)?;
     let classes = check_new_classes(transaction, classes_at(connection, head)?)?;
     Ok(check_states(transaction, &classes)?)
-}
-
-/// The version that the same idempotency key made before.
-fn made_before(connection: &Connection, transaction: &UpdateTransaction) -> Result<Option<VersionId>, Fault> {
-    transaction.idempotency_key.as_deref().map_or(Ok(None), |key| version_with(connection, key))
 }
 
 /// The version that a transaction with this idempotency key made, if there is one.
@@ -104,4 +117,15 @@ pub(super) fn version_with(connection: &Connection, key: &str) -> Result<Option<
     let mut statement = connection.prepare_cached(SQL)?;
     let made = statement.query_row(named_params! {":key": key}, |row| row.get::<_, i64>(0)).optional()?;
     Ok(made.map(|version| VersionId(version.unsigned_abs())))
+}
+
+/// What was asked for with the key of `version`.
+pub(super) fn request_of(connection: &Connection, version: VersionId) -> Result<Option<Digest>, Fault> {
+    const SQL: &str = "SELECT request FROM version WHERE version = :version ORDER BY version";
+    if format_of(connection)? < REQUEST_FORMAT {
+        return Ok(None);
+    }
+    let mut statement = connection.prepare_cached(SQL)?;
+    let request = statement.query_row(named_params! {":version": version.0 as i64}, |row| row.get(0)).optional()?;
+    Ok(request.flatten().map(Digest))
 }

@@ -1,7 +1,7 @@
 //! Why a transaction is not committed.
 
 use super::error::StoreError;
-use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId};
+use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId, VersionKind};
 
 /// Why a transaction was not committed; the map is as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -26,6 +26,32 @@ pub enum CommitError {
         version: VersionId,
         /// ` in the region`, or nothing.
         place: &'static str,
+    },
+    /// An idempotency key under which something else was asked for.
+    #[error(
+        "idempotency key {key:?} made version {version} for {}, and comes with {} now; expected the same request again, or another key",
+        request(made),
+        request(asked)
+    )]
+    OtherRequest {
+        /// The key.
+        key: String,
+        /// What it made.
+        version: VersionId,
+        /// What was asked for then, where the map knows.
+        made: (VersionKind, Option<Digest>),
+        /// What is asked for now, where it is said.
+        asked: (VersionKind, Option<Digest>),
+    },
+    /// The idempotency key of a proposal that is another.
+    #[error(
+        "idempotency key {key:?} is that of proposal {id}, which is another; expected the same again, or another key"
+    )]
+    OtherProposal {
+        /// The key.
+        key: String,
+        /// The proposal.
+        id: u64,
     },
     /// Nothing to commit.
     #[error("the transaction changes nothing; expected at least one feature or a class table")]
@@ -111,6 +137,13 @@ pub struct ConflictingChange {
     pub found: Option<FeatureState>,
     /// Whether the transaction changes it; else it only lies in the viewed region.
     pub is_target: bool,
+}
+
+fn request((kind, digest): &(VersionKind, Option<Digest>)) -> String {
+    match digest {
+        Some(digest) => format!("the {} {digest}", kind.name()),
+        None => format!("the {} of which no digest is known", kind.name()),
+    }
 }
 
 fn since(base: VersionId, head: VersionId) -> String {

@@ -5,11 +5,21 @@ use super::error::StoreError;
 use super::revert::{Revert, undoing};
 use super::snapshot::Snapshot;
 use crate::version::{
-    BoxMm, Counts, Delta, Digest, Feature, FeatureState, Fid, Revision, UpdateTransaction, VersionId, VersionRecord,
+    BoxMm, Counts, Delta, Digest, Feature, FeatureState, Fid, Revision, UpdateTransaction, VersionId, VersionKind,
+    VersionRecord,
 };
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use std::collections::BTreeMap;
+
+/// What a request for a version gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Made {
+    /// The version.
+    pub version: VersionId,
+    /// Whether the same request made it before.
+    pub repeated: bool,
+}
 
 /// The history of one map: boxes in whole millimetres, versions as integers, and nothing of any database.
 ///
@@ -31,6 +41,9 @@ pub trait History {
 
     /// The version that a transaction with this idempotency key made, if there is one.
     fn made_with(&self, key: &str) -> Result<Option<VersionId>, StoreError>;
+
+    /// What was asked for with the key of `version`; `None` for a version without a key, or where nobody said.
+    fn request_of(&self, version: VersionId) -> Result<Option<Digest>, StoreError>;
 
     /// The classes at `version`.
     fn classes(&self, version: VersionId) -> Result<ClassTable, StoreError>;
@@ -67,8 +80,8 @@ pub trait History {
     /// Makes the next version of everything in `transaction`, or refuses it and changes nothing.
     ///
     /// The version's time is `now`, or that of the version before where the clock went back. A key that was used before
-    /// gives the version it made then.
-    fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError>;
+    /// gives the version it made then, and is refused where something else was asked for then.
+    fn commit_once(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<Made, CommitError>;
 
     /// Names `version`.
     fn tag(&self, name: &str, version: VersionId, now: Timestamp) -> Result<(), StoreError>;
@@ -85,6 +98,28 @@ pub trait History {
         Self: Sized,
     {
         Snapshot::of(self, version)
+    }
+
+    /// As [`History::commit_once`], for who need not know whether the version was there already.
+    fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
+        self.commit_once(transaction, now).map(|made| made.version)
+    }
+
+    /// The version that the same request made before under `key`; `None` for a new key. Refuses a key under which
+    /// something else was asked for, as far as both say what.
+    fn repeated(
+        &self,
+        key: Option<&str>,
+        (kind, request): (VersionKind, Option<Digest>),
+    ) -> Result<Option<VersionId>, CommitError> {
+        let Some(key) = key else { return Ok(None) };
+        let Some(version) = self.made_with(key)? else { return Ok(None) };
+        let made = (self.version(version)?.kind, self.request_of(version)?);
+        let is_same = made.0 == kind && (made.1 == request || made.1.is_none() || request.is_none());
+        if is_same {
+            return Ok(Some(version));
+        }
+        Err(CommitError::OtherRequest { key: key.to_owned(), version, made, asked: (kind, request) })
     }
 
     /// What `version` did.
@@ -104,7 +139,15 @@ pub trait History {
     /// Undoes a version by a new one, or refuses it with a list when later versions changed the same features. What is
     /// undone never was, so the new version speaks of the time that the old one spoke of.
     fn revert(&self, wish: &Revert, now: Timestamp) -> Result<VersionId, CommitError> {
-        self.commit(&undoing(self, wish)?, now)
+        self.revert_once(wish, now).map(|made| made.version)
+    }
+
+    /// As [`History::revert`], and says whether the undo was there already, which is looked for before anything else.
+    fn revert_once(&self, wish: &Revert, now: Timestamp) -> Result<Made, CommitError> {
+        match self.repeated(wish.idempotency_key.as_deref(), (VersionKind::Revert, wish.request))? {
+            Some(version) => Ok(Made { version, repeated: true }),
+            None => self.commit_once(&undoing(self, wish)?, now),
+        }
     }
 
     /// The version that `revision` names: `12`, `v12`, `head`, a tag, `@2026-03-01` (the end of that day, UTC) or

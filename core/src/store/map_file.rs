@@ -286,7 +286,7 @@ fn fill(connection: &Connection, new: &NewMap, now: Timestamp) -> Result<(), Wri
     )?;
     seal::META.seal(connection, &1)?;
     let record = first_version(new, now);
-    VersionRow::insert(connection, &record)?;
+    VersionRow::insert(connection, &record, None)?;
     seal::VERSION.seal(connection, &0)?;
     insert_classes(connection, record.version, &new.classes)?;
     Ok(())

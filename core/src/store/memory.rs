@@ -2,7 +2,7 @@
 
 use super::commit_error::{CommitError, ConflictingChange};
 use super::error::StoreError;
-use super::interface::History;
+use super::interface::{History, Made};
 use super::map_file::{NewMap, first_version};
 use super::observations::evidence_digest;
 use super::plan::{
@@ -28,18 +28,19 @@ pub struct MemoryMap(RefCell<Contents>);
 
 #[derive(Debug)]
 struct Contents {
-    versions: Vec<Made>,
+    versions: Vec<Kept>,
     geometries: BTreeMap<Digest, Vec<u8>>,
     tags: BTreeMap<String, VersionId>,
 }
 
 /// One version and what it did.
 #[derive(Debug)]
-struct Made {
+struct Kept {
     record: VersionRecord,
     deltas: Vec<Delta>,
     classes: ClassTable,
     looked_at: Option<BoxMm>,
+    request: Option<Digest>,
 }
 
 type State = BTreeMap<Fid, FeatureState>;
@@ -49,18 +50,18 @@ impl MemoryMap {
     pub fn new(new: &NewMap, now: Timestamp) -> Result<Self, StoreError> {
         check_classes(&new.classes)?;
         let record = first_version(new, now);
-        let first = Made { record, deltas: Vec::new(), classes: new.classes.clone(), looked_at: None };
+        let first = Kept { record, deltas: Vec::new(), classes: new.classes.clone(), looked_at: None, request: None };
         let contents = Contents { versions: vec![first], geometries: BTreeMap::new(), tags: BTreeMap::new() };
         Ok(Self(RefCell::new(contents)))
     }
 }
 
 impl Contents {
-    fn head(&self) -> &Made {
+    fn head(&self) -> &Kept {
         self.versions.last().expect("invariant: version 0 is made with the map")
     }
 
-    fn made(&self, version: VersionId) -> Result<&Made, StoreError> {
+    fn made(&self, version: VersionId) -> Result<&Kept, StoreError> {
         let made = usize::try_from(version.0).ok().and_then(|version| self.versions.get(version));
         made.ok_or(StoreError::NoSuchVersion { version, head: self.head().record.version })
     }
@@ -147,10 +148,11 @@ impl Contents {
         let plan = plan(transaction, |fid| live.get(&fid).cloned(), last_fid, &head.record, (evidence, now))?;
         let version = plan.record.version;
         let (record, deltas, looked_at) = (plan.record, plan.deltas, transaction.viewed_region);
+        let request = transaction.request.filter(|_| transaction.idempotency_key.is_some());
         let needed: Vec<Digest> = needed_geometry(transaction).map(|(_, digest)| digest).collect();
         let given = needed.iter().filter_map(|digest| Some((*digest, transaction.geometries.get(digest)?.clone())));
         self.geometries.extend(given);
-        self.versions.push(Made { record, deltas, classes, looked_at });
+        self.versions.push(Kept { record, deltas, classes, looked_at, request });
         Ok(version)
     }
 }
@@ -194,6 +196,10 @@ impl History for MemoryMap {
         let contents = self.0.borrow();
         let made = contents.versions.iter().find(|made| made.record.idempotency_key.as_deref() == Some(key));
         Ok(made.map(|made| made.record.version))
+    }
+
+    fn request_of(&self, version: VersionId) -> Result<Option<Digest>, StoreError> {
+        Ok(self.0.borrow().made(version)?.request)
     }
 
     fn classes(&self, version: VersionId) -> Result<ClassTable, StoreError> {
@@ -259,11 +265,13 @@ impl History for MemoryMap {
         Ok(deltas.filter(|delta| touches(delta, region)).collect())
     }
 
-    fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
-        if let Some(made) = transaction.idempotency_key.as_deref().map_or(Ok(None), |key| self.made_with(key))? {
-            return Ok(made);
+    fn commit_once(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<Made, CommitError> {
+        let asked = (transaction.kind, transaction.request);
+        if let Some(version) = self.repeated(transaction.idempotency_key.as_deref(), asked)? {
+            return Ok(Made { version, repeated: true });
         }
-        self.0.borrow_mut().commit(transaction, now)
+        let version = self.0.borrow_mut().commit(transaction, now)?;
+        Ok(Made { version, repeated: false })
     }
 
     fn tag(&self, name: &str, version: VersionId, _now: Timestamp) -> Result<(), StoreError> {

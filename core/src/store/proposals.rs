@@ -185,12 +185,22 @@ fn check_is_descriptors(transaction: &UpdateTransaction) -> Result<(), CommitErr
     }
 }
 
-fn proposed_before(connection: &Connection, transaction: &UpdateTransaction) -> Result<Option<u64>, Fault> {
-    const SQL: &str = "SELECT id FROM proposal WHERE idempotency_key = :key ORDER BY id LIMIT 1";
+/// The proposal that the same request made before; refuses the key of a proposal that is another.
+fn proposed_before(
+    connection: &Connection,
+    transaction: &UpdateTransaction,
+) -> Result<Option<u64>, WriteFault<CommitError>> {
+    const SQL: &str = "SELECT id, operations FROM proposal WHERE idempotency_key = :key ORDER BY id LIMIT 1";
     let Some(key) = &transaction.idempotency_key else { return Ok(None) };
     let mut statement = connection.prepare_cached(SQL)?;
-    let made = statement.query_row(named_params! {":key": key}, |row| row.get::<_, i64>(0)).optional()?;
-    Ok(made.map(i64::unsigned_abs))
+    let read = |row: &Row| Ok((row.get::<_, i64>(0)?.unsigned_abs(), row.get::<_, Vec<u8>>(1)?));
+    let Some((id, operations)) = statement.query_row(named_params! {":key": key}, read).optional()? else {
+        return Ok(None);
+    };
+    if operations != proposal_bytes(&transaction.deltas, &transaction.additions) {
+        return Err(CommitError::OtherProposal { key: key.clone(), id }.into());
+    }
+    Ok(Some(id))
 }
 
 fn insert(

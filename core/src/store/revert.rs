@@ -5,7 +5,7 @@ use super::commit_error::CommitError;
 use super::error::StoreError;
 use super::interface::History;
 use super::map_file::MapFile;
-use crate::version::{BoxMm, Delta, UpdateTransaction, VersionId, VersionKind, VersionRecord};
+use crate::version::{BoxMm, Delta, Digest, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use std::cmp::Reverse;
@@ -24,34 +24,48 @@ pub struct Revert {
     pub message: Option<String>,
     /// The same key a second time gives the version of the first time.
     pub idempotency_key: Option<String>,
+    /// Digest of what is asked for: the same key with another one is refused.
+    pub request: Option<Digest>,
+}
+
+/// What became of a wish to undo several versions.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reverted {
+    /// What was undone and by which version, in the order of the versions that undid it.
+    pub undone: Vec<(VersionId, VersionId)>,
+    /// Whether the same request did it before.
+    pub repeated: bool,
 }
 
 impl MapFile {
     /// Undoes each of `versions` that still shows, newest first, each by a version of its own: all of them or none. `wish`
-    /// says the rest; its idempotency key goes to the first. Gives what was undone and by which version.
-    pub fn revert_all(
-        &self,
-        versions: &[VersionId],
-        wish: &Revert,
-        now: Timestamp,
-    ) -> Result<Vec<(VersionId, VersionId)>, CommitError> {
+    /// says the rest; its idempotency key goes to the first, and with `#2`, `#3` … to the further ones.
+    pub fn revert_all(&self, versions: &[VersionId], wish: &Revert, now: Timestamp) -> Result<Reverted, CommitError> {
         let newest_first: BTreeSet<Reverse<VersionId>> = versions.iter().copied().map(Reverse).collect();
         self.write(|connection| {
-            let mut key = wish.idempotency_key.clone();
-            if let Some(made) = key.as_deref().map_or(Ok(None), |key| self.made_with(key))? {
-                let undone = self.version(made)?.reverts.unwrap_or(made);
-                return Ok(vec![(undone, made)]);
+            let mut undone = self.undone_before(wish)?;
+            if !undone.is_empty() {
+                return Ok(Reverted { undone, repeated: true });
             }
-            let mut done = Vec::new();
             for Reverse(version) in newest_first {
-                let one = Revert { version, idempotency_key: key.clone(), ..wish.clone() };
+                let one = Revert { version, idempotency_key: nth_key(wish, undone.len()), ..wish.clone() };
                 let Some(transaction) = self.undoing_what_shows(&one)? else { continue };
                 let made = make_unseen_version(connection, &transaction, None, now)?;
-                key = None;
-                done.push((version, made.version));
+                undone.push((version, made.version));
             }
-            Ok(done)
+            Ok(Reverted { undone, repeated: false })
         })
+    }
+
+    /// What the same request undid before, and by which versions.
+    pub fn undone_before(&self, wish: &Revert) -> Result<Vec<(VersionId, VersionId)>, CommitError> {
+        let mut undone = Vec::new();
+        while let Some(version) =
+            self.repeated(nth_key(wish, undone.len()).as_deref(), (VersionKind::Revert, wish.request))?
+        {
+            undone.push((self.version(version)?.reverts.unwrap_or(version), version));
+        }
+        Ok(undone)
     }
 
     /// The transaction that undoes what `wish` names, without what is undone already.
@@ -78,6 +92,12 @@ impl MapFile {
     }
 }
 
+/// The key of the undo after so many others of one wish.
+fn nth_key(wish: &Revert, others: usize) -> Option<String> {
+    let key = wish.idempotency_key.as_deref()?;
+    Some(if others == 0 { key.to_owned() } else { format!("{key}#{}", others + 1) })
+}
+
 /// The transaction that undoes what `wish` names.
 pub(super) fn undoing(history: &(impl History + ?Sized), wish: &Revert) -> Result<UpdateTransaction, CommitError> {
     let record = history.version(wish.version)?;
@@ -92,6 +112,7 @@ pub(super) fn undoing(history: &(impl History + ?Sized), wish: &Revert) -> Resul
     transaction.reverts = Some(wish.version);
     transaction.observed_at = Some(record.observed_at.unwrap_or(record.committed_at));
     transaction.idempotency_key.clone_from(&wish.idempotency_key);
+    transaction.request = wish.request;
     transaction.deltas = deltas.into_iter().map(Delta::undone).collect();
     transaction.classes = classes;
     Ok(transaction)

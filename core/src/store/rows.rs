@@ -68,11 +68,18 @@ impl VersionRow {
         })
     }
 
-    pub(super) fn insert(connection: &Connection, record: &VersionRecord) -> Result<(), Fault> {
+    /// Writes it, with what was asked for.
+    pub(super) fn insert(
+        connection: &Connection,
+        record: &VersionRecord,
+        request: Option<Digest>,
+    ) -> Result<(), Fault> {
         const SQL: &str = "INSERT INTO version (version, kind, committed_at, observed_at, author, message,
-                base_version, reverts, added, modified, removed, e0, e1, n0, n1, h0, h1, idempotency_key, evidence, hash)
+                base_version, reverts, added, modified, removed, e0, e1, n0, n1, h0, h1, idempotency_key, evidence, hash,
+                request)
             VALUES (:version, :kind, :committed_at, :observed_at, :author, :message,
-                :base_version, :reverts, :added, :modified, :removed, :e0, :e1, :n0, :n1, :h0, :h1, :key, :evidence, :hash)";
+                :base_version, :reverts, :added, :modified, :removed, :e0, :e1, :n0, :n1, :h0, :h1, :key, :evidence, :hash,
+                :request)";
         let [e0, e1, n0, n1, h0, h1] = box_columns(record.envelope.as_ref());
         connection.prepare_cached(SQL)?.execute(named_params! {
             ":version": record.version.0 as i64, ":kind": record.kind.name(),
@@ -85,6 +92,7 @@ impl VersionRow {
             ":removed": record.counts.removed as i64,
             ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1,
             ":key": record.idempotency_key, ":evidence": record.evidence.map(|digest| digest.0), ":hash": record.hash.0,
+            ":request": request.map(|digest| digest.0),
         })?;
         Ok(())
     }

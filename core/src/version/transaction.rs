@@ -86,6 +86,8 @@ pub struct UpdateTransaction {
     pub reverts: Option<VersionId>,
     /// The same key a second time gives the version of the first time and changes nothing (a phone may retry).
     pub idempotency_key: Option<String>,
+    /// Digest of what was asked for: the same key with another one is refused.
+    pub request: Option<Digest>,
     /// New features, to which the map gives the next free numbers in this order.
     pub additions: Vec<FeatureState>,
     /// Changes of numbered features, at most one each.
@@ -111,6 +113,7 @@ impl UpdateTransaction {
             observed_at: None,
             reverts: None,
             idempotency_key: None,
+            request: None,
             additions: Vec::new(),
             deltas: Vec::new(),
             geometries: BTreeMap::new(),

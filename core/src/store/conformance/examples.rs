@@ -1,8 +1,9 @@
 //! Laws that one example shows.
 
+use super::laws::wish;
 use super::{Make, add, at, banner, chair, new_map, sound, state, transaction, with_two_features};
-use crate::store::{CommitError, ConflictingChange, StoreError};
-use crate::version::{BoxMm, Delta, Digest, FeatureState, Fid, UpdateTransaction, VersionId};
+use crate::store::{CommitError, ConflictingChange, Made, Revert, StoreError};
+use crate::version::{BoxMm, Delta, Digest, FeatureState, Fid, UpdateTransaction, VersionId, VersionKind};
 
 /// A metre around what stands `offset` m north of the place of the test's features.
 fn around(offset: f64) -> BoxMm {
@@ -70,6 +71,35 @@ pub fn a_retry_is_committed_once(make: Make<'_>) {
     assert_eq!(history.commit(&update, at(4)), Ok(VersionId(2)));
     assert_eq!(history.made_with("phone 7, photo 12"), Ok(Some(VersionId(2))));
     assert_eq!(history.head(), Ok(VersionId(3)));
+    sound(subject.as_ref());
+}
+
+/// What was asked for under a key is the only thing that gets its version; anything else is told both.
+pub fn a_key_goes_with_one_request(make: Make<'_>) {
+    let subject = with_two_features(make);
+    let history = subject.history();
+    let asking = |offset: f64, request: Option<Digest>| {
+        let mut update = transaction(1);
+        update.additions = vec![chair(offset)];
+        (update.idempotency_key, update.request) = (Some("photo 12".to_owned()), request);
+        update
+    };
+    let (first, other) = (Digest::of(b"first"), Digest::of(b"other"));
+    let version = VersionId(2);
+    let made = |repeated| Ok(Made { version, repeated });
+    assert_eq!(history.commit_once(&asking(3.0, Some(first)), at(2)), made(false));
+    assert_eq!(history.commit_once(&asking(3.0, Some(first)), at(3)), made(true));
+    // Who does not say what is asked for is believed.
+    assert_eq!(history.commit_once(&asking(3.0, None), at(3)), made(true));
+    let made = (VersionKind::Update, Some(first));
+    let refused = |kind, request| {
+        let asked = (kind, request);
+        Err(CommitError::OtherRequest { key: "photo 12".to_owned(), version, made, asked })
+    };
+    assert_eq!(history.commit_once(&asking(4.0, Some(other)), at(3)), refused(VersionKind::Update, Some(other)));
+    let undo = Revert { idempotency_key: Some("photo 12".to_owned()), ..wish(1) };
+    assert_eq!(history.revert_once(&undo, at(3)), refused(VersionKind::Revert, None));
+    assert_eq!((history.head(), history.request_of(version)), (Ok(version), Ok(Some(first))));
     sound(subject.as_ref());
 }
 

@@ -29,8 +29,15 @@ fn for_all<S: Strategy>(
     }
 }
 
-fn wish(version: u64) -> Revert {
-    Revert { version: VersionId(version), region: None, author: "ada".to_owned(), message: None, idempotency_key: None }
+pub(super) fn wish(version: u64) -> Revert {
+    Revert {
+        version: VersionId(version),
+        region: None,
+        author: "ada".to_owned(),
+        message: None,
+        idempotency_key: None,
+        request: None,
+    }
 }
 
 fn undo(history: &dyn History, version: usize) -> Result<VersionId, CommitError> {

@@ -61,6 +61,7 @@ macro_rules! conformance_tests {
             of_two_writers_at_one_place_the_second_is_refused,
             writers_at_different_places_both_pass,
             a_retry_is_committed_once,
+            a_key_goes_with_one_request,
             a_late_photo_speaks_of_its_own_time,
             a_number_is_never_given_twice,
             geometry_is_kept_once_under_its_digest,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::store::conformance::{self, Make};
-use crate::store::{MemoryMap, StoreError};
+use crate::store::{Made, MemoryMap, StoreError};
 use crate::version::{BoxMm, Delta, Digest, Feature, UpdateTransaction, VersionRecord};
 use jiff::Timestamp;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -51,6 +51,9 @@ impl History for Faulty {
     fn made_with(&self, key: &str) -> Result<Option<VersionId>, StoreError> {
         self.map.made_with(key)
     }
+    fn request_of(&self, version: VersionId) -> Result<Option<Digest>, StoreError> {
+        self.map.request_of(version)
+    }
     fn classes(&self, version: VersionId) -> Result<ClassTable, StoreError> {
         self.map.classes(version)
     }
@@ -85,7 +88,7 @@ impl History for Faulty {
         let (from, to) = if self.wrong == Wrong::OneWay { (from.min(to), from.max(to)) } else { (from, to) };
         self.map.changes(from, to, region)
     }
-    fn commit(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<VersionId, CommitError> {
+    fn commit_once(&self, transaction: &UpdateTransaction, now: Timestamp) -> Result<Made, CommitError> {
         let mut transaction = transaction.clone();
         match self.wrong {
             Wrong::NoKeys => transaction.idempotency_key = None,
@@ -98,7 +101,7 @@ impl History for Faulty {
             }
             _ => {}
         }
-        self.map.commit(&transaction, now)
+        self.map.commit_once(&transaction, now)
     }
     fn tag(&self, name: &str, version: VersionId, now: Timestamp) -> Result<(), StoreError> {
         self.map.tag(name, version, now)

@@ -113,6 +113,7 @@ fn what_depended_on_forgotten_versions_is_refused_not_guessed() {
         author: String::new(),
         message: None,
         idempotency_key: None,
+        request: None,
     };
     let gone = StoreError::Forgotten { version: VersionId(4), next: VersionId(5) };
     assert_eq!(scratch.map.revert(&wish, at(9)), Err(CommitError::Store(gone.clone())));

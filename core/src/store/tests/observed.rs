@@ -48,6 +48,7 @@ fn what_was_undone_never_was() {
         author: String::new(),
         message: None,
         idempotency_key: None,
+        request: None,
     };
     scratch.map.revert(&wish, at(200)).unwrap();
     assert_eq!(seen(&scratch, 2, 25), [(1, chair(4.0))]);

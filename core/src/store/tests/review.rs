@@ -94,3 +94,23 @@ fn a_tag_is_deleted_only_when_asked_and_its_version_stays() {
     assert_eq!(scratch.map.untag("surveyed"), Err(StoreError::NoSuchTag { name: "surveyed".to_owned() }));
     assert_eq!((scratch.map.tags(), scratch.map.head()), (Ok(vec![]), Ok(VersionId(1))));
 }
+
+#[test]
+fn a_proposal_whose_key_made_a_version_is_refused_by_name_and_stays_open() {
+    let scratch = Scratch::with_two_features();
+    let keyed = |offset: f64| {
+        let mut update = transaction(1);
+        update.additions = vec![chair(offset)];
+        update.idempotency_key = Some("photo 12".to_owned());
+        update
+    };
+    let id = scratch.map.propose(&keyed(3.0), at(2)).unwrap();
+    scratch.map.commit(&keyed(4.0), at(3)).unwrap();
+    let error = scratch.map.accept(id, "ada", "", at(4)).unwrap_err();
+    assert!(matches!(error, CommitError::OtherRequest { version: VersionId(2), .. }), "{error}");
+    assert_eq!(scratch.map.proposal(id).unwrap().status, ProposalStatus::Open);
+    // The same key with another proposal is no repetition either.
+    let other = scratch.map.propose(&keyed(5.0), at(5)).unwrap_err();
+    assert_eq!(other, CommitError::OtherProposal { key: "photo 12".to_owned(), id });
+    assert_eq!(scratch.map.propose(&keyed(3.0), at(5)), Ok(id));
+}

@@ -1,11 +1,18 @@
 //! Undoing versions.
 
 use super::*;
-use crate::store::{ConflictingChange, Revert, StoreError};
+use crate::store::{ConflictingChange, Made, Revert, Reverted, StoreError};
 use crate::version::{BoxMm, Counts, Delta, Digest, VersionKind};
 
 fn wish(version: u64, region: Option<BoxMm>) -> Revert {
-    Revert { version: VersionId(version), region, author: "ada".to_owned(), message: None, idempotency_key: None }
+    Revert {
+        version: VersionId(version),
+        region,
+        author: "ada".to_owned(),
+        message: None,
+        idempotency_key: None,
+        request: None,
+    }
 }
 
 fn undo(scratch: &Scratch, version: u64) -> Result<VersionId, CommitError> {
@@ -119,4 +126,28 @@ fn an_undo_that_is_sent_twice_is_done_once() {
     assert_eq!(scratch.map.revert(&keyed, at(3)), Ok(VersionId(2)));
     assert_eq!(scratch.map.made_with("undo 1"), Ok(Some(VersionId(2))));
     assert_eq!(scratch.map.head(), Ok(VersionId(2)));
+}
+
+#[test]
+fn an_undo_that_is_sent_again_is_found_although_what_it_undid_is_forgotten() {
+    let scratch = Scratch::with_two_features();
+    let keyed = Revert { idempotency_key: Some("undo 1".to_owned()), ..wish(1, None) };
+    assert_eq!(scratch.map.revert(&keyed, at(2)), Ok(VersionId(2)));
+    scratch.map.gc(Some(VersionId(2)), at(3)).unwrap();
+    assert_eq!(scratch.map.revert_once(&keyed, at(4)), Ok(Made { version: VersionId(2), repeated: true }));
+}
+
+#[test]
+fn several_undos_that_are_sent_again_are_all_told_again() {
+    let scratch = Scratch::with_two_features();
+    scratch.add(1, &[chair(3.0)]).unwrap();
+    scratch.add(2, &[chair(6.0)]).unwrap();
+    let keyed = Revert { idempotency_key: Some("all".to_owned()), ..wish(0, None) };
+    let versions = [VersionId(2), VersionId(3)];
+    let undone = vec![(VersionId(3), VersionId(4)), (VersionId(2), VersionId(5))];
+    let once = scratch.map.revert_all(&versions, &keyed, at(4)).unwrap();
+    assert_eq!(once, Reverted { undone: undone.clone(), repeated: false });
+    scratch.map.gc(Some(VersionId(5)), at(5)).unwrap();
+    let again = scratch.map.revert_all(&versions, &keyed, at(6)).unwrap();
+    assert_eq!((again, scratch.map.head()), (Reverted { undone, repeated: true }, Ok(VersionId(5))));
 }
