@@ -120,9 +120,9 @@ pub fn version(record: &VersionRecord) -> Value {
         "message": record.message,
         "base_version": record.base.map(|base| base.0),
         "reverts": record.reverts.map(|version| version.0),
-        "added": record.counts.added,
-        "modified": record.counts.modified,
-        "removed": record.counts.removed,
+        "added": record.counts.map(|counts| counts.added),
+        "modified": record.counts.map(|counts| counts.modified),
+        "removed": record.counts.map(|counts| counts.removed),
         "hash": record.hash.to_string(),
     })
 }

@@ -27,7 +27,7 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
             committed.map_err(|error| Failure::from(error).about(&options.file))?
         }
     };
-    let (version, counts) = (made.version, map.version(made.version)?.counts);
+    let (version, counts) = (made.version, map.version(made.version)?.counts.unwrap_or_default());
     if console.is_json() {
         let mut document = json!({
             "base_version": version.0.saturating_sub(1), "version": version.0,

@@ -6,7 +6,7 @@ use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
 use resurvey_core::store::{History, MapFile, Provenance, RecordedObservation};
-use resurvey_core::version::{Fid, Observation, VersionId};
+use resurvey_core::version::{Fid, Observation, Side, VersionId};
 use resurvey_schema::ClassTable;
 use serde_json::{Value, json};
 
@@ -27,23 +27,15 @@ pub fn run(options: &Why, console: &mut Console<'_>) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn op(step: &Provenance) -> &'static str {
-    match (step.delta.before(), step.delta.after()) {
-        (None, _) => "add",
-        (_, None) => "remove",
-        _ => "modify",
-    }
-}
-
 fn document_of(map: &MapFile, step: &Provenance, classes: &ClassTable) -> Result<Value, Failure> {
     let side = |state: Option<&resurvey_core::version::FeatureState>| {
         state.map(|state| document::state(state, classes)).transpose()
     };
     Ok(json!({
-        "op": op(step),
+        "op": step.step.name(),
         "version": document::version(&step.record),
-        "before": side(step.delta.before())?,
-        "after": side(step.delta.after())?,
+        "before": side(step.step.before.state())?,
+        "after": side(step.step.after.state())?,
         "observation": step.observation.as_ref().map(|seen| observation(map, seen, classes)).transpose()?,
         "reverted": step.record.reverts.map(|version| reverted(map, version, classes)).transpose()?,
     }))
@@ -109,12 +101,15 @@ fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
 fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
     let record = &step.record;
     let (version, kind, author) = (record.version, record.kind.name(), &record.author);
-    console.line(format_args!("version {version}: {} by {kind}, {author}, {}", op(step), record.committed_at))?;
+    let op = step.step.name().unwrap_or("unknown, forgotten,");
+    console.line(format_args!("version {version}: {op} by {kind}, {author}, {}", record.committed_at))?;
     console.line(format_args!("  message   {}", record.message))?;
     console.line(format_args!("  hash      {}", record.hash))?;
-    for (side, state) in [("before", step.delta.before()), ("after", step.delta.after())] {
-        if let Some(state) = state {
-            console.line(format_args!("  {side:9} {}", super::diff::words(state, classes)))?;
+    for (name, side) in [("before", &step.step.before), ("after", &step.step.after)] {
+        match side {
+            Side::State(state) => console.line(format_args!("  {name:9} {}", super::diff::words(state, classes)))?,
+            Side::Forgotten => console.line(format_args!("  {name:9} unknown, forgotten"))?,
+            Side::Absent => {}
         }
     }
     if let Some(reverted) = record.reverts {

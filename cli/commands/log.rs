@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::region;
 use comfy_table::{Table, presets};
 use resurvey_core::store::{History, MapFile};
-use resurvey_core::version::{Fid, VersionRecord};
+use resurvey_core::version::{Counts, Fid, VersionRecord};
 use serde_json::json;
 
 /// Versions that changed something, newest first.
@@ -42,17 +42,21 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
         "message",
     ]);
     for record in &records {
+        let count = |pick: fn(Counts) -> u64| record.counts.map_or("?".to_owned(), |counts| pick(counts).to_string());
         table.add_row([
             record.version.to_string(),
             record.kind.name().to_owned(),
             record.committed_at.to_string(),
             record.author.clone(),
-            record.counts.added.to_string(),
-            record.counts.modified.to_string(),
-            record.counts.removed.to_string(),
+            count(|counts| counts.added),
+            count(|counts| counts.modified),
+            count(|counts| counts.removed),
             record.message.clone(),
         ]);
     }
     console.line(table.trim_fmt())?;
+    if records.iter().any(|record| record.counts.is_none()) {
+        console.message("?: unknown, forgotten");
+    }
     Ok(0)
 }

@@ -86,7 +86,7 @@ fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mu
 /// What `version` undid.
 fn undone(map: &MapFile, version: VersionId) -> Result<Value, Failure> {
     let record = map.version(version)?;
-    let counts = record.counts;
+    let counts = record.counts.unwrap_or_default();
     Ok(json!({
         "reverts": record.reverts.map(|reverts| reverts.0), "version": version.0,
         "added": counts.added, "modified": counts.modified, "removed": counts.removed,

@@ -59,6 +59,33 @@ fn what_is_forgotten_is_refused_by_name_and_what_is_kept_is_as_it_was() {
     assert_eq!(bench.head(), 6);
 }
 
+#[test]
+fn what_a_forgotten_version_did_to_a_feature_or_region_is_unknown() {
+    let bench = long();
+    bench.run("gc", &["--forget-before", "head"]).ok();
+    // The chair came with version 1 and was moved by 2, which has a tag, and by 3 to 5.
+    let why = bench.json("why", &["1"]);
+    let steps: Vec<Value> = why["steps"].as_array().unwrap().clone();
+    let ops: Vec<_> = steps.iter().map(|step| (step["version"]["version"].clone(), step["op"].clone())).collect();
+    assert_eq!(ops, [5, 3, 2].map(|version| (json!(version), Value::Null)));
+    assert_eq!((&steps[0]["before"], &steps[1]["after"]), (&Value::Null, &Value::Null));
+    assert_eq!((&steps[0]["after"]["class"], &steps[1]["before"]["class"]), (&json!("chair"), &json!("chair")));
+    let text = bench.run("why", &["1"]).ok().out;
+    let words =
+        ["version 5: unknown, forgotten, by apply", "before    unknown, forgotten", "after     unknown, forgotten"];
+    assert!(words.iter().all(|words| text.contains(words)), "{text}");
+    for question in [&["1"][..], &["--bbox", "835590,817790,835660,817810"]] {
+        let log = bench.json("log", question);
+        let counts = |record: &Value| (record["added"].clone(), record["modified"].clone(), record["removed"].clone());
+        let all: Vec<_> = log["versions"].as_array().unwrap().iter().map(counts).collect();
+        assert!(!all.is_empty() && all.iter().all(|one| *one == (Value::Null, Value::Null, Value::Null)), "{log}");
+        let run = bench.run("log", question).ok();
+        assert!(run.out.contains(" ? ") && run.err.contains("?: unknown, forgotten"), "{}{}", run.out, run.err);
+    }
+    let log = bench.json("log", &[]);
+    assert_eq!((&log["versions"][0]["modified"], &log["versions"][4]["added"]), (&json!(1), &json!(2)));
+}
+
 /// The bytes of every label image that a map of the street keeps are worth forgetting.
 #[test]
 fn the_file_gets_smaller() {

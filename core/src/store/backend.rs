@@ -4,7 +4,7 @@ use super::commit::{commit, request_of, version_with};
 use super::commit_error::CommitError;
 use super::differences::{changes, changes_in};
 use super::error::StoreError;
-use super::forgotten::check_state;
+use super::forgotten::{check_state, is_kept};
 use super::index;
 use super::interface::{History, Made};
 use super::logs::{all_records, record, records_in};
@@ -69,6 +69,10 @@ impl History for MapFile {
         region: Option<&BoxMm>,
     ) -> Result<Vec<Feature>, StoreError> {
         self.read(|connection| features_observed(connection, version, time, region))
+    }
+
+    fn is_kept(&self, version: VersionId) -> Result<bool, StoreError> {
+        self.read(|connection| is_kept(connection, version))
     }
 
     fn feature(&self, version: VersionId, fid: Fid) -> Result<Feature, StoreError> {

@@ -35,6 +35,11 @@ pub(super) fn remains_of(connection: &Connection, version: VersionId) -> Result<
     Ok(statement.query_row(named_params! {":version": version.0 as i64}, read).optional()?)
 }
 
+/// Whether the state of `version` is there.
+pub(super) fn is_kept(connection: &Connection, version: VersionId) -> Result<bool, Fault> {
+    Ok(remains_of(connection, version)?.is_none_or(|remains| remains.has_state))
+}
+
 /// What is left of every version that gc touched.
 pub(super) fn all_remains(connection: &Connection) -> Result<BTreeMap<VersionId, Remains>, Fault> {
     const SQL: &str = "SELECT version, has_state, operations FROM forgotten ORDER BY version";
@@ -54,7 +59,7 @@ pub(super) fn check_state(connection: &Connection, version: VersionId) -> Result
     const NEXT: &str = "SELECT min(v.version) FROM version AS v WHERE v.version > :version
         AND NOT EXISTS (SELECT 1 FROM forgotten AS f WHERE f.version = v.version AND f.has_state = 0) ORDER BY 1";
     check_version(connection, version)?;
-    if remains_of(connection, version)?.is_none_or(|remains| remains.has_state) {
+    if is_kept(connection, version)? {
         return Ok(());
     }
     let mut statement = connection.prepare_cached(NEXT)?;

@@ -5,7 +5,7 @@ use super::error::StoreError;
 use super::revert::{Revert, undoing};
 use super::snapshot::Snapshot;
 use crate::version::{
-    BoxMm, Counts, Delta, Digest, Feature, FeatureState, Fid, Revision, UpdateTransaction, VersionId, VersionKind,
+    BoxMm, Delta, Digest, Feature, FeatureState, Fid, Revision, Side, Step, UpdateTransaction, VersionId, VersionKind,
     VersionRecord,
 };
 use jiff::Timestamp;
@@ -127,12 +127,16 @@ pub trait History {
         self.changes(VersionId(version.0.saturating_sub(1)), version, None)
     }
 
-    /// The versions that changed the feature `fid`, newest first, each with the counts of just that.
+    /// Whether the state of `version` is there; a store may forget it.
+    fn is_kept(&self, _version: VersionId) -> Result<bool, StoreError> {
+        Ok(true)
+    }
+
+    /// The versions that changed the feature `fid`, newest first, each with the counts of just that, as far as the states
+    /// that are left tell.
     fn log_of(&self, fid: Fid) -> Result<Vec<VersionRecord>, StoreError> {
-        let steps = steps(fid, self.lives(fid)?);
-        let record = |(version, delta): &(VersionId, Delta)| {
-            Ok(VersionRecord { counts: Counts::of([delta]), ..self.version(*version)? })
-        };
+        let steps = steps(self.lives(fid)?, |version| self.is_kept(version))?;
+        let record = |step: &Step| Ok(VersionRecord { counts: step.counts(), ..self.version(step.version)? });
         steps.iter().rev().map(record).collect()
     }
 
@@ -175,8 +179,9 @@ fn resolve(history: &(impl History + ?Sized), revision: &Revision) -> Result<Ver
     }
 }
 
-/// Every version that changed `fid` and how, oldest first, from its life spans.
-pub(super) fn steps(fid: Fid, lives: Vec<Feature>) -> Vec<(VersionId, Delta)> {
+/// Every version that changed a feature and how, oldest first, from its life spans. Where no life ends or begins, the
+/// feature was not there, if the state before or after is kept; else nobody knows.
+pub(super) fn steps<E>(lives: Vec<Feature>, is_kept: impl Fn(VersionId) -> Result<bool, E>) -> Result<Vec<Step>, E> {
     let mut sides: BTreeMap<VersionId, (Option<FeatureState>, Option<FeatureState>)> = BTreeMap::new();
     for life in lives {
         sides.entry(life.from).or_default().1 = Some(life.state.clone());
@@ -184,6 +189,16 @@ pub(super) fn steps(fid: Fid, lives: Vec<Feature>) -> Vec<(VersionId, Delta)> {
             sides.entry(to).or_default().0 = Some(life.state);
         }
     }
-    let step = |(version, (before, after))| Some((version, Delta::from_sides(fid, before, after)?));
-    sides.into_iter().filter_map(step).collect()
+    let side = |state: Option<FeatureState>, at: Option<VersionId>| {
+        Ok(match state {
+            Some(state) => Side::State(state),
+            None if at.map_or(Ok(true), &is_kept)? => Side::Absent,
+            None => Side::Forgotten,
+        })
+    };
+    let step = |(version, (before, after)): (VersionId, _)| {
+        let earlier = version.0.checked_sub(1).map(VersionId);
+        Ok(Step { version, before: side(before, earlier)?, after: side(after, Some(version))? })
+    };
+    sides.into_iter().map(step).collect()
 }

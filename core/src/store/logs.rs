@@ -2,13 +2,14 @@
 
 use super::StoreError;
 use super::error::Fault;
+use super::forgotten::{all_remains, is_kept};
 use super::index::{self, Ids, LIVE};
 use super::interface::steps;
 use super::map_file::MapFile;
 use super::observations::{self, RecordedObservation};
 use super::rows::VersionRow;
 use super::states::{check_version, lives};
-use crate::version::{BoxMm, Counts, Delta, Fid, VersionId, VersionRecord};
+use crate::version::{BoxMm, Counts, Fid, Step, VersionId, VersionRecord};
 use rusqlite::{Connection, named_params};
 use std::collections::BTreeMap;
 
@@ -17,8 +18,8 @@ use std::collections::BTreeMap;
 pub struct Provenance {
     /// The version that made the step.
     pub record: VersionRecord,
-    /// The step.
-    pub delta: Delta,
+    /// The step, as far as the states that are left tell.
+    pub step: Step,
     /// The evidence, where the version has any.
     pub observation: Option<RecordedObservation>,
 }
@@ -28,9 +29,9 @@ impl MapFile {
     pub fn why(&self, fid: Fid) -> Result<Vec<Provenance>, StoreError> {
         self.read(|connection| {
             let mut provenance = Vec::new();
-            for (version, delta) in steps(fid, lives(connection, fid)?).into_iter().rev() {
-                let observation = observations::of_version(connection, version)?;
-                provenance.push(Provenance { record: record(connection, version)?, delta, observation });
+            for step in steps(lives(connection, fid)?, |version| is_kept(connection, version))?.into_iter().rev() {
+                let observation = observations::of_version(connection, step.version)?;
+                provenance.push(Provenance { record: record(connection, step.version)?, step, observation });
             }
             Ok(provenance)
         })
@@ -49,10 +50,13 @@ pub(super) fn all_records(connection: &Connection) -> Result<Vec<VersionRecord>,
     Ok(records)
 }
 
-/// The versions that changed something in `region`, newest first, each with the counts of just that.
+/// The versions that changed something in `region`, newest first, each with the counts of just that, where all of that is
+/// left.
 pub(super) fn records_in(connection: &Connection, region: &BoxMm) -> Result<Vec<VersionRecord>, Fault> {
+    let remains = all_remains(connection)?;
     let mut records = Vec::new();
     for (version, counts) in counts_in(connection, region)?.into_iter().rev() {
+        let counts = (!remains.contains_key(&version)).then_some(counts);
         records.push(VersionRecord { counts, ..record(connection, version)? });
     }
     Ok(records)

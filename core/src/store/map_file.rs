@@ -304,7 +304,7 @@ pub(super) fn first_version(new: &NewMap, now: Timestamp) -> VersionRecord {
         message: new.message.clone(),
         base: None,
         reverts: None,
-        counts: Counts::default(),
+        counts: Some(Counts::default()),
         envelope: None,
         idempotency_key: None,
         evidence: None,

@@ -180,7 +180,7 @@ impl History for MemoryMap {
         let Some(region) = region else { return Ok(newest_first.map(|made| made.record.clone()).collect()) };
         let there = newest_first.filter_map(|made| {
             let counts = Counts::of(made.deltas.iter().filter(|delta| touches(delta, Some(region))));
-            (counts != Counts::default()).then(|| VersionRecord { counts, ..made.record.clone() })
+            (counts != Counts::default()).then(|| VersionRecord { counts: Some(counts), ..made.record.clone() })
         });
         Ok(there.collect())
     }

@@ -130,7 +130,7 @@ pub(super) fn plan(
         message: transaction.message.clone(),
         base: Some(transaction.base),
         reverts: transaction.reverts,
-        counts: Counts::of(&deltas),
+        counts: Some(Counts::of(&deltas)),
         envelope,
         idempotency_key: transaction.idempotency_key.clone(),
         evidence,

@@ -60,7 +60,7 @@ impl VersionRow {
             message: row.get("message")?,
             base: version("base_version")?,
             reverts: version("reverts")?,
-            counts: Counts { added: count("added")?, modified: count("modified")?, removed: count("removed")? },
+            counts: Some(Counts { added: count("added")?, modified: count("modified")?, removed: count("removed")? }),
             envelope: read_box(row)?,
             idempotency_key: row.get("idempotency_key")?,
             evidence: row.get::<_, Option<[u8; 32]>>("evidence")?.map(Digest),
@@ -81,6 +81,7 @@ impl VersionRow {
                 :base_version, :reverts, :added, :modified, :removed, :e0, :e1, :n0, :n1, :h0, :h1, :key, :evidence, :hash,
                 :request)";
         let [e0, e1, n0, n1, h0, h1] = box_columns(record.envelope.as_ref());
+        let counts = record.counts.unwrap_or_default();
         connection.prepare_cached(SQL)?.execute(named_params! {
             ":version": record.version.0 as i64, ":kind": record.kind.name(),
             ":committed_at": record.committed_at.as_microsecond(),
@@ -88,8 +89,8 @@ impl VersionRow {
             ":author": record.author, ":message": record.message,
             ":base_version": record.base.map(|version| version.0 as i64),
             ":reverts": record.reverts.map(|version| version.0 as i64),
-            ":added": record.counts.added as i64, ":modified": record.counts.modified as i64,
-            ":removed": record.counts.removed as i64,
+            ":added": counts.added as i64, ":modified": counts.modified as i64,
+            ":removed": counts.removed as i64,
             ":e0": e0, ":e1": e1, ":n0": n0, ":n1": n1, ":h0": h0, ":h1": h1,
             ":key": record.idempotency_key, ":evidence": record.evidence.map(|digest| digest.0), ":hash": record.hash.0,
             ":request": request.map(|digest| digest.0),

@@ -28,7 +28,7 @@ pub use feature_state::{FeatureState, InvalidState};
 pub use observation::{Decision, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange};
 pub use operations::{Frame, Operations, version_hash};
 pub(crate) use operations::{proposal_bytes, read_proposal_bytes};
-pub use record::{Feature, VersionRecord};
+pub use record::{Feature, Side, Step, VersionRecord};
 pub(crate) use revision::is_tag_name;
 pub use revision::{InvalidRevision, Revision, parse_moment};
 pub use transaction::{Fid, UpdateTransaction, VersionId, VersionKind};

@@ -151,9 +151,9 @@ pub(in crate::store) fn doubtful(connection: &Connection) -> Result<BTreeSet<Ver
 
 fn check_sums(record: &VersionRecord, deltas: &[Delta], findings: &mut Findings) {
     let place = || format!("version {}", record.version);
-    let counts = Counts::of(deltas);
-    if counts != record.counts {
-        findings.add(place(), format!("says {:?}, its features say {counts:?}", record.counts));
+    let (counts, said) = (Counts::of(deltas), record.counts.unwrap_or_default());
+    if counts != said {
+        findings.add(place(), format!("says {said:?}, its features say {counts:?}"));
     }
     let envelope = envelope_of(deltas);
     if envelope != record.envelope {

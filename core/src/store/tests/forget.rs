@@ -4,7 +4,7 @@ use super::fsck::eventful;
 use super::*;
 use crate::store::conformance::Content;
 use crate::store::{Forgetting, StoreError};
-use crate::version::{Delta, Digest, Observation, VersionRecord};
+use crate::version::{BoxMm, Counts, Delta, Digest, Observation, Side, Step, VersionRecord};
 use proptest::prelude::*;
 use rusqlite::Connection;
 
@@ -119,7 +119,7 @@ fn what_depended_on_forgotten_versions_is_refused_not_guessed() {
     assert_eq!(scratch.map.revert(&wish, at(9)), Err(CommitError::Store(gone.clone())));
     let mut stale = transaction(4);
     stale.additions = vec![chair(30.0)];
-    stale.viewed_region = Some(crate::version::BoxMm::of_plan(0.0, 0.0, 1.0, 1.0).unwrap());
+    stale.viewed_region = Some(BoxMm::of_plan(0.0, 0.0, 1.0, 1.0).unwrap());
     assert_eq!(scratch.map.commit(&stale, at(9)), Err(CommitError::Store(gone)));
     let missing = StoreError::NoSuchVersion { version: VersionId(9), head: VersionId(5) };
     assert_eq!(scratch.map.gc(Some(VersionId(9)), at(9)), Err(missing));
@@ -197,4 +197,44 @@ fn a_life_span_that_is_still_asked_for_cannot_be_deleted() {
     ] {
         assert!(raw.execute_batch(sql).is_err(), "{sql}");
     }
+}
+
+#[test]
+fn what_a_forgotten_version_did_is_said_to_be_unknown_and_not_guessed() {
+    let scratch = Scratch::new();
+    scratch.add(0, &[chair(0.0), banner(50.0)]).unwrap();
+    for version in 1..5 {
+        let mut update = transaction(version);
+        let (before, after) = (chair(version as f64 - 1.0), chair(version as f64));
+        update.deltas = vec![Delta::modify(Fid(1), before, after)];
+        if version == 4 {
+            update.deltas.push(Delta::remove(Fid(2), banner(50.0)));
+        }
+        scratch.map.commit(&update, at(version as i64 + 1)).unwrap();
+    }
+    scratch.map.tag("surveyed", VersionId(3), at(9)).unwrap();
+    scratch.map.gc(Some(VersionId(5)), at(9)).unwrap();
+    let state = |offset: f64| Side::State(chair(offset));
+    let step = |version, before, after| Step { version: VersionId(version), before, after };
+    let steps = |fid| scratch.map.why(Fid(fid)).unwrap().into_iter().map(|one| one.step).collect::<Vec<_>>();
+    // Version 1, 2 and 4 are forgotten. That the banner came with version 1 is known, because version 0 had nothing.
+    let expected = [
+        step(5, Side::Forgotten, state(4.0)),
+        step(4, state(2.0), Side::Forgotten),
+        step(3, Side::Forgotten, state(2.0)),
+    ];
+    assert_eq!(steps(1), expected);
+    let hung = || Side::State(banner(50.0));
+    assert_eq!(steps(2), [step(5, hung(), Side::Absent), step(1, Side::Absent, hung())]);
+    let counts = |log: Vec<VersionRecord>| log.into_iter().map(|one| (one.version.0, one.counts)).collect::<Vec<_>>();
+    assert_eq!(counts(scratch.map.log_of(Fid(1)).unwrap()), [(5, None), (4, None), (3, None)]);
+    let (added, removed) = (Counts { added: 1, ..Counts::default() }, Counts { removed: 1, ..Counts::default() });
+    assert_eq!(counts(scratch.map.log_of(Fid(2)).unwrap()), [(5, Some(removed)), (1, Some(added))]);
+    // Of a region a forgotten version may have changed more than what is left tells.
+    let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+    let there = counts(scratch.map.log(Some(&everywhere)).unwrap());
+    assert_eq!(there, [(5, None), (4, None), (3, None), (1, None)]);
+    // The versions themselves still say how many they changed.
+    let counts = Counts { modified: 1, ..Counts::default() };
+    assert_eq!(scratch.map.version(VersionId(4)).unwrap().counts, Some(counts));
 }

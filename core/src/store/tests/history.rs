@@ -4,6 +4,7 @@ use super::*;
 use crate::store::{ProposalStatus, StoreError};
 use crate::version::{
     BoxMm, Counts, Decision, Delta, Digest, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange,
+    Side, Step,
 };
 use resurvey_schema::service::Prior;
 use resurvey_schema::{Alignment, CameraModel, Intrinsics, Pose, Rejection, RunnerUp};
@@ -19,7 +20,7 @@ fn a_feature_that_leaves_the_region_is_a_modification_with_both_sides() {
     assert_eq!(deltas, update.deltas);
     let log: Vec<_> =
         scratch.map.log(Some(&old_place)).unwrap().iter().map(|record| (record.version.0, record.counts)).collect();
-    let counts = |added, modified| Counts { added, modified, removed: 0 };
+    let counts = |added, modified| Some(Counts { added, modified, removed: 0 });
     assert_eq!(log, [(2, counts(0, 1)), (1, counts(1, 0))]);
 }
 
@@ -47,7 +48,7 @@ fn the_log_of_a_feature_is_newest_first_and_says_what_happened_to_it_alone() {
         scratch.map.log_of(Fid(2)).unwrap().into_iter().map(|record| (record.version.0, record.counts)).collect();
     assert_eq!(
         log,
-        [(2, Counts { added: 0, modified: 0, removed: 1 }), (1, Counts { added: 1, modified: 0, removed: 0 })]
+        [(2, Some(Counts { removed: 1, ..Counts::default() })), (1, Some(Counts { added: 1, ..Counts::default() }))]
     );
     assert_eq!(scratch.map.log_of(Fid(9)), Err(StoreError::NeverAFeature { fid: Fid(9) }));
     let all: Vec<_> = scratch.map.log(None).unwrap().iter().map(|record| record.version.0).collect();
@@ -128,7 +129,8 @@ fn why_shows_the_evidence_of_every_step_to_the_last_bit() {
     assert_eq!(recorded.observation, Observation { labels: None, ..observation(Decision::Committed) });
     assert_eq!((recorded.version, recorded.recorded_at), (Some(VersionId(2)), at(2)));
     assert_eq!(scratch.map.label_image(recorded.labels.unwrap()), Ok(Some(b"png".to_vec())));
-    assert_eq!(second.delta, update.deltas[0]);
+    let (before, after) = (Side::State(banner(0.0)), Side::State(banner(1.0)));
+    assert_eq!(second.step, Step { version: VersionId(2), before, after });
 }
 
 #[test]

@@ -75,7 +75,7 @@ fn an_undo_of_a_region_leaves_the_rest() {
     assert_eq!(scratch.map.revert(&wish(2, around(100.0)), at(3)), Ok(VersionId(3)));
     assert_eq!(both(&scratch), (banner(1.0), chair(100.0)));
     let counts = scratch.map.version(VersionId(3)).unwrap().counts;
-    assert_eq!(counts, Counts { added: 0, modified: 1, removed: 0 });
+    assert_eq!(counts, Some(Counts { added: 0, modified: 1, removed: 0 }));
     let nothing = CommitError::NothingToRevert { version: VersionId(2), place: " in the region" };
     assert_eq!(scratch.map.revert(&wish(2, around(500.0)), at(4)), Err(nothing));
     assert_eq!(undo(&scratch, 3), Ok(VersionId(4)));
