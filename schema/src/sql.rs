@@ -13,3 +13,6 @@ pub const MIGRATIONS: &[&str] = &[
 
 /// The index of the newest format for one connection to an older map.
 pub const INDEX_BESIDE: &str = include_str!("../sql/index_beside.sql");
+
+/// Takes it away again.
+pub const INDEX_BESIDE_END: &str = include_str!("../sql/index_beside_end.sql");

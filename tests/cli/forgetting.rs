@@ -156,6 +156,20 @@ fn a_map_of_every_format_so_far_opens_unchanged_and_takes_another_version() {
         json(&["gc", map, "--dry-run"]);
         json(&["why", map, "1"]);
         json(&["proposals", map]);
+        let typo = directory.path().join("typo.jsonl");
+        std::fs::write(&typo, "{").unwrap();
+        let set = directory.path().join("set.jsonl");
+        let gone = json!({"op": "remove", "fid": 99, "before": chair_at(0.0)});
+        std::fs::write(&set, crate::change_sets::set(None, &[gone])).unwrap();
+        for (code, words) in [
+            (10, &["apply", map, text(&typo)][..]),
+            (10, &["tag", map, "surveyed"]),
+            (11, &["revert", map, "99"]),
+            (11, &["proposals", map, "accept", "9"]),
+            (21, &["apply", map, text(&set)]),
+        ] {
+            assert_eq!(resurvey(words).code, code, "{words:?}");
+        }
         assert_eq!((std::fs::read(&path).unwrap() == bytes, format_of()), (true, format), "{name}");
         json(&["proposals", map, "accept", "1"]);
         assert_eq!((json(&["query", map])["version"].as_u64(), format_of()), (Some(head + 1), 4), "{name}");

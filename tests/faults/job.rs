@@ -91,7 +91,7 @@ pub fn jobs() -> &'static Jobs {
         ok("update", &[capture, "--pose", pose, "--propose"]);
         let eventful = now("eventful.rsv");
         all.push(Job::new("gc", &["--forget-before", "head"], eventful.clone()));
-        // The first command that writes to a map of an older format migrates it before.
+        // The first command that writes to a map of an older format migrates it with what it writes.
         let older = place.path("format-2.rsv");
         fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/map-format-2.rsv"), &older).unwrap();
         all.push(Job::new("apply", &[chair_set], older));

@@ -1,9 +1,9 @@
 //! Making and opening a map file.
 
+use super::beside::Beside;
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
-use super::index::build_beside;
-use super::migrate::{INDEX_FORMAT, migrate};
+use super::migrate::migrate;
 use super::rows::{VersionRow, check_classes, insert_classes};
 use super::seal;
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
@@ -12,6 +12,7 @@ use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, named_params};
+use std::cell::Cell;
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -30,6 +31,7 @@ pub struct MapFile {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
     writable: bool,
+    beside: Cell<Beside>,
 }
 
 /// What a new map is made of.
@@ -73,7 +75,7 @@ impl MapFile {
         }
         let made = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
             .map_err(|fault| fault.at(path))
-            .and_then(|map| map.write(|connection| fill(connection, new, now)).map(|()| map))
+            .and_then(|map| map.transact(|connection| fill(connection, new, now)).map(|()| map))
             .and_then(|map| map.use_write_ahead_log().map(|()| map));
         if made.is_err() {
             // The file is ours: create_new made it. Nothing of use is in it.
@@ -82,20 +84,16 @@ impl MapFile {
         made
     }
 
-    /// Opens a map to read and write.
+    /// Opens a map to read and write. One of an older format is migrated with the first change that is written.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         inspect(path)?;
         if is_marked_read_only(path) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
         let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path))?;
-        let format = map.check_format()?;
+        map.beside.set(Beside::for_format(map.check_format()? as usize));
         if map.connection.is_readonly(rusqlite::MAIN_DB).unwrap_or(true) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
-        }
-        map.use_write_ahead_log()?;
-        if (format as usize) < MIGRATIONS.len() {
-            map.write(|connection| -> Result<(), WriteFault<StoreError>> { Ok(migrate(connection)?) })?;
         }
         Ok(map)
     }
@@ -111,10 +109,9 @@ impl MapFile {
                 Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
             };
             let map = map.map_err(|fault| fault.at(path))?;
-            if (map.check_format()? as usize) < INDEX_FORMAT {
-                map.outside(|connection| Ok(connection.pragma_update(None, "temp_store", "MEMORY")?))?;
-                map.read(build_beside)?;
-            }
+            map.beside.set(Beside::for_format(map.check_format()? as usize));
+            // What keeps the file from being read is said here.
+            map.read(|_| Ok(()))?;
             Ok(map)
         };
         // Reading a file with a write-ahead log needs a shared-memory file beside it, unless nobody can write.
@@ -162,8 +159,10 @@ impl MapFile {
                 return work(connection);
             }
             let frozen = Transaction::new_unchecked(connection, TransactionBehavior::Deferred)?;
+            let beside = self.beside.get().refreshed(&frozen)?;
             let found = work(&frozen)?;
             frozen.commit()?;
+            self.beside.set(beside);
             Ok(found)
         })
     }
@@ -173,18 +172,46 @@ impl MapFile {
         work(&self.connection).map_err(|fault| fault.at(&self.path))
     }
 
-    /// Runs `work` in one immediate transaction: all of it or nothing.
-    ///
-    /// Immediate, because a reading transaction that wants to write later is refused at once when another writer was
-    /// faster, whatever the busy timeout.
+    /// Runs `work` on the map in the newest format, in one immediate transaction: all of it or nothing. Until something is
+    /// written the file keeps every byte.
     pub(super) fn write<T, E: From<StoreError>>(
         &self,
         work: impl FnOnce(&Connection) -> Result<T, WriteFault<E>>,
     ) -> Result<T, E> {
-        let at = |fault: Fault| E::from(fault.at(&self.path));
         if !self.writable {
             return Err(StoreError::ReadOnly { path: self.path.clone() }.into());
         }
+        let done = self.transact(|connection| {
+            self.bring_up_to_date(connection).map_err(|error| WriteFault::Refused(error.into()))?;
+            work(connection)
+        })?;
+        self.beside.set(Beside::NotNeeded);
+        // A copy that another program made may have another journal. What is written is safe in that too, and readers
+        // do not wait for the next.
+        let _ = self.use_write_ahead_log();
+        Ok(done)
+    }
+
+    /// Migrates a map of an older format; refuses one that a newer program has migrated since it was opened.
+    fn bring_up_to_date(&self, connection: &Connection) -> Result<(), StoreError> {
+        let format = self.check_format()? as usize;
+        let migrated = self
+            .beside
+            .get()
+            .ended(connection)
+            .and_then(|_| if format < MIGRATIONS.len() { migrate(connection) } else { Ok(()) });
+        migrated.map_err(|fault| fault.at(&self.path))
+    }
+
+    /// Runs `work` in one immediate transaction.
+    ///
+    /// Immediate, because a reading transaction that wants to write later is refused at once when another writer was
+    /// faster, whatever the busy timeout.
+    fn transact<T, E: From<StoreError>>(
+        &self,
+        work: impl FnOnce(&Connection) -> Result<T, WriteFault<E>>,
+    ) -> Result<T, E> {
+        let at = |fault: Fault| E::from(fault.at(&self.path));
         let begin = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
         let transaction = begin.map_err(|error| at(error.into()))?;
         match work(&transaction) {
@@ -219,8 +246,9 @@ impl MapFile {
             connection.pragma_update(None, pragma, value)?;
         }
         connection.pragma_update(None, "synchronous", "FULL")?;
+        connection.pragma_update(None, "temp_store", "MEMORY")?;
         let writable = flags.contains(OpenFlags::SQLITE_OPEN_READ_WRITE);
-        Ok(Self { connection, path: path.to_owned(), writable })
+        Ok(Self { connection, path: path.to_owned(), writable, beside: Cell::new(Beside::NotNeeded) })
     }
 
     fn use_write_ahead_log(&self) -> Result<(), StoreError> {

@@ -2,6 +2,7 @@
 //! project is here.
 
 mod backend;
+mod beside;
 mod blobs;
 mod commit;
 mod commit_error;

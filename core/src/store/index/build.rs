@@ -6,7 +6,6 @@ use super::origin::IndexOrigin;
 use super::write::insert;
 use crate::store::error::Fault;
 use crate::version::{FeatureState, VersionId};
-use resurvey_schema::sql::INDEX_BESIDE;
 use rusqlite::{Connection, Row};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,12 +48,6 @@ impl Source {
         let ends = self.origin.and_then(|origin| origin.to_index(&bounds));
         Ok(ends.map_or(Expected::Outside, |ends| Expected::At(Cell::of(&ends), Life { id, ends, first, last })))
     }
-}
-
-/// Makes the index of a map that has another one, or none, for this connection alone.
-pub(in crate::store) fn build_beside(connection: &Connection) -> Result<(), Fault> {
-    connection.execute_batch(INDEX_BESIDE)?;
-    rebuild(connection, &Source::read(connection)?, BTreeMap::new())
 }
 
 /// Makes the index anew. `kept` are lives of rows that do not say where they belong.

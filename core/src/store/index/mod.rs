@@ -12,7 +12,7 @@ mod search;
 mod write;
 
 pub(super) use block::LIVE;
-pub(super) use build::{Source, build_beside, rebuild};
+pub(super) use build::{Source, rebuild};
 pub(super) use check::{Flaw, flaws};
 pub(super) use origin::{IndexBox, IndexOrigin, hilbert_key};
 pub(super) use search::{Ids, bounds_of, changed_since, difference, lives_in, state};

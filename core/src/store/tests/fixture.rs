@@ -6,7 +6,7 @@ use crate::store::StoreError;
 use crate::version::{BoxMm, Delta, Digest};
 use std::path::PathBuf;
 
-/// The format that maps have after they are opened for writing.
+/// The format that maps have after something is written to them.
 const NEWEST: i32 = 4;
 
 fn fixture(format: u32) -> PathBuf {
@@ -58,7 +58,7 @@ const TURNS: u64 = 6;
 fn the_map_of_format_3_opens_with_the_blocks_of_its_index() {
     let (_directory, path) = copy(3);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), NEWEST));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 3));
     let blocks = "SELECT max(count) FROM (SELECT count(*) AS count FROM feature_index GROUP BY cell) ORDER BY 1";
     let most: i64 = map.read(|connection| Ok(connection.query_row(blocks, [], |row| row.get(0))?)).unwrap();
     assert!(most > 1, "no cell has a second block");
@@ -73,7 +73,7 @@ fn the_map_of_format_3_opens_with_the_blocks_of_its_index() {
 fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
     let (_directory, path) = copy(2);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), NEWEST));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), 2));
     let gone = StoreError::Forgotten { version: VersionId(3), next: VersionId(4) };
     assert_eq!(map.snapshot(VersionId(3)).err(), Some(gone));
     let chair_then = map.snapshot(VersionId(1)).unwrap().feature(Fid(2)).unwrap().state;
@@ -84,11 +84,15 @@ fn the_map_of_format_2_opens_with_what_it_forgot_and_what_it_looked_at() {
     let mut stale = transaction(4);
     stale.additions = vec![chair(31.0)];
     let CommitError::Conflict { looked_at, .. } = map.commit(&stale, at(9)).unwrap_err() else { panic!() };
-    assert_eq!(looked_at, [VersionId(5)]);
+    assert_eq!((looked_at, map.info().unwrap().format), (vec![VersionId(5)], 2));
+    stale.base = VersionId(5);
+    assert_eq!(map.commit(&stale, at(9)), Ok(VersionId(6)));
+    assert_eq!((map.fsck(), map.info().unwrap().format), (Ok(Vec::new()), NEWEST));
+    assert_eq!(map.snapshot(VersionId(6)).unwrap().features_observed(at(6), None).unwrap().len(), 4);
 }
 
 #[test]
-fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() {
+fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_something_is_written() {
     let (_directory, path) = copy(1);
     let before = std::fs::read(&path).unwrap();
     let reader = MapFile::open_read_only(&path).unwrap();
@@ -101,9 +105,51 @@ fn a_map_of_format_1_is_read_as_it_is_and_migrated_when_it_is_opened_to_write() 
     drop(reader);
     assert_eq!(std::fs::read(&path).unwrap(), before);
     let map = MapFile::open(&path).unwrap();
-    assert_eq!((map.info().unwrap().format, map.fsck()), (NEWEST, Ok(Vec::new())));
+    let snapshot = map.snapshot(VersionId(2)).unwrap();
+    assert_eq!(snapshot.features(Some(&everywhere)), snapshot.features(None));
+    let taken = map.tag("surveyed", VersionId(2), at(9)).unwrap_err();
+    assert!(matches!(taken, StoreError::TagTaken { .. }), "{taken}");
+    assert_eq!(map.made_with("a key"), Ok(None));
+    assert_eq!((map.info().unwrap().format, std::fs::read(&path).unwrap() == before), (1, true));
     map.gc(Some(VersionId(4)), at(9)).unwrap();
-    assert_eq!(map.fsck(), Ok(Vec::new()));
+    assert_eq!((map.info().unwrap().format, map.fsck()), (NEWEST, Ok(Vec::new())));
+    let snapshot = map.snapshot(VersionId(4)).unwrap();
+    assert_eq!(snapshot.features(Some(&everywhere)), snapshot.features(None));
+}
+
+#[test]
+fn a_reader_of_an_older_map_sees_what_others_commit_and_that_they_migrate_it() {
+    let (_directory, path) = copy(1);
+    let reader = MapFile::open_read_only(&path).unwrap();
+    let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+    let agree = |version| {
+        let snapshot = reader.snapshot(VersionId(version)).unwrap();
+        let there = snapshot.features(Some(&everywhere)).unwrap();
+        assert_eq!(there, snapshot.features(None).unwrap());
+        there.len()
+    };
+    assert_eq!(agree(4), 3);
+    // A program of that time adds a banner and takes the chair that came with version 2.
+    let old = rusqlite::Connection::open(&path).unwrap();
+    old.execute_batch(
+        "INSERT INTO version SELECT 5, 'apply', committed_at, NULL, '', '', 4, NULL, 1, 0, 1, NULL, NULL, NULL, NULL, NULL,
+            NULL, NULL, NULL, hash FROM version WHERE version = 4;
+        INSERT INTO feature_version (fid, from_version, kind, class, geometry, state)
+            SELECT 77, 5, kind, class, geometry, state FROM feature_version WHERE fid = 1 AND to_version IS NULL;
+        UPDATE feature_version SET to_version = 5 WHERE fid = 3 AND to_version IS NULL",
+    )
+    .unwrap();
+    assert_eq!((agree(5), agree(4)), (3, 3));
+    let [writer, late] = [(); 2].map(|()| MapFile::open(&path).unwrap());
+    assert_eq!(late.snapshot(VersionId(5)).unwrap().features(Some(&everywhere)).unwrap().len(), 3);
+    let mut update = transaction(5);
+    update.additions = vec![chair(9.0)];
+    assert_eq!(writer.commit(&update, at(9)), Ok(VersionId(6)));
+    assert_eq!((reader.info().unwrap().format, agree(6), agree(5)), (NEWEST, 4, 3));
+    // Who opened it before finds it migrated.
+    update.base = VersionId(6);
+    assert_eq!(late.commit(&update, at(9)), Ok(VersionId(7)));
+    assert_eq!((agree(7), late.snapshot(VersionId(7)).unwrap().features(Some(&everywhere)).unwrap().len()), (5, 5));
 }
 
 #[test]

@@ -39,6 +39,31 @@ fn a_newer_format_is_refused_by_both_numbers() {
 }
 
 #[test]
+fn a_map_that_a_newer_program_migrated_meanwhile_is_not_written_to() {
+    let scratch = Scratch::with_two_features();
+    let raw = Connection::open(scratch.map.path()).unwrap();
+    raw.pragma_update(None, "user_version", 7).unwrap();
+    let refused = scratch.add(1, &[chair(1.0)]).unwrap_err();
+    assert!(matches!(refused, CommitError::Store(StoreError::NewerFormat { found: 7, .. })), "{refused}");
+    assert_eq!(scratch.map.head(), Ok(VersionId(1)));
+}
+
+#[test]
+fn a_copy_with_another_journal_keeps_its_bytes_until_something_is_written() {
+    let scratch = Scratch::with_two_features();
+    let path = scratch.directory.path().join("copy.rsv");
+    scratch.map.connection.execute("VACUUM INTO ?1", [path.to_str().unwrap()]).unwrap();
+    let before = fs::read(&path).unwrap();
+    let map = MapFile::open(&path).unwrap();
+    assert!(matches!(map.untag("none"), Err(StoreError::NoSuchTag { .. })));
+    assert_eq!(map.head(), Ok(VersionId(1)));
+    assert!(fs::read(&path).unwrap() == before);
+    map.tag("surveyed", VersionId(1), at(2)).unwrap();
+    let mode: String = map.connection.pragma_query_value(None, "journal_mode", |row| row.get(0)).unwrap();
+    assert_eq!((mode.as_str(), map.fsck()), ("wal", Ok(Vec::new())));
+}
+
+#[test]
 fn a_truncated_map_is_damaged() {
     let Scratch { directory, map } = Scratch::with_two_features();
     let path = map.path().to_owned();
