@@ -66,7 +66,8 @@ fn mend_index(connection: &Connection, done: &mut Vec<Problem>) -> Result<(), Fa
     if found.0.is_empty() {
         return Ok(());
     }
-    if let Some(first) = IndexOrigin::first(connection)?.filter(|first| Some(*first) != source.origin) {
+    let first = IndexOrigin::first(connection).ok().flatten();
+    if let Some(first) = first.filter(|first| Some(*first) != source.origin) {
         let from_first = Source { origin: Some(first), doubtful: source.doubtful.clone() };
         let found_from_first = flaws(connection, &from_first)?;
         if found_from_first.0.len() <= found.0.len() {

@@ -5,12 +5,13 @@ use crate::store::error::Fault;
 use crate::version::{Digest, Observation, is_tag_name, read_proposal_bytes};
 use rusqlite::{Connection, Row};
 
-/// Observations are what their digest and their version say.
+/// Observations are what their digest and their version say, and those that confirm them are there.
 pub(super) fn observations(connection: &Connection, findings: &mut Findings) -> Result<(), Fault> {
     const ROWS: &str = "SELECT o.id, o.version, o.capture, o.labels, o.decision, o.body, o.digest, v.evidence
         FROM observation AS o LEFT JOIN version AS v ON v.version = o.version ORDER BY o.id";
     const MISSING: &str = "SELECT v.version FROM version AS v LEFT JOIN observation AS o ON o.version = v.version
         WHERE v.evidence IS NOT NULL AND o.id IS NULL ORDER BY v.version";
+    const NAMED: &str = "SELECT 1 FROM observation WHERE digest = ?1 ORDER BY id";
     let mut statement = connection.prepare(ROWS)?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
@@ -24,8 +25,18 @@ pub(super) fn observations(connection: &Connection, findings: &mut Findings) -> 
         if let Some(version) = version.filter(|_| evidence != Some(digest)) {
             findings.add(&place, format!("is not the evidence that version {version} was hashed with"));
         }
-        if let Err(detail) = agrees(row, &body)? {
-            findings.add(&place, detail);
+        match Observation::from_json(&body) {
+            Ok(observation) => {
+                if !agrees(row, &observation, &body)? {
+                    findings.add(&place, "capture, labels or decision differ from the text");
+                }
+                for digest in observation.confirmations {
+                    if !connection.prepare_cached(NAMED)?.exists([digest.0])? {
+                        findings.add(&place, format!("is confirmed by observation {digest}, which is not there"));
+                    }
+                }
+            }
+            Err(detail) => findings.add(&place, detail),
         }
     }
     let mut statement = connection.prepare(MISSING)?;
@@ -36,19 +47,14 @@ pub(super) fn observations(connection: &Connection, findings: &mut Findings) -> 
     Ok(())
 }
 
-/// Whether `body` is an observation that says the same as the columns made from it.
-fn agrees(row: &Row, body: &str) -> Result<Result<(), String>, Fault> {
-    let observation = match Observation::from_json(body) {
-        Ok(observation) => observation,
-        Err(detail) => return Ok(Err(detail)),
-    };
+/// Whether the columns made from `observation`, whose text is `body`, say the same.
+fn agrees(row: &Row, observation: &Observation, body: &str) -> Result<bool, Fault> {
     let (capture, decision): ([u8; 32], String) = (row.get("capture")?, row.get("decision")?);
     let labels = row.get::<_, Option<[u8; 32]>>("labels")?.map(|digest| Digest(digest).to_string());
     let file: serde_json::Value = serde_json::from_str(body).unwrap_or_default();
-    let agree = observation.capture.0 == capture
+    Ok(observation.capture.0 == capture
         && observation.decision.name() == decision
-        && file["labels"].as_str() == labels.as_deref();
-    Ok(if agree { Ok(()) } else { Err("capture, labels or decision differ from the text".to_owned()) })
+        && file["labels"].as_str() == labels.as_deref())
 }
 
 /// The operations of proposals can be read.

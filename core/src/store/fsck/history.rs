@@ -73,6 +73,9 @@ fn check_place(record: &VersionRecord, last: Option<&VersionRecord>, findings: &
     if is_first != (record.kind == VersionKind::Init) || is_first != record.base.is_none() {
         findings.add(place(), "version 0, and no other, is of kind init and without a base");
     }
+    if (record.kind == VersionKind::Revert) != record.reverts.is_some() {
+        findings.add(place(), "a version of kind revert, and no other, names what it undoes");
+    }
 }
 
 /// What has to be recomputed from the rows of features and classes.

@@ -51,6 +51,10 @@ impl Cell {
 
     /// The last cell up to this one that can hold boxes that meet `region`.
     pub(super) fn down_to(self, region: &IndexBox) -> Option<Self> {
+        // In a damaged map a number may be none of a cell; all cells come after it.
+        if self.0 < 0 {
+            return None;
+        }
         let (mut row, mut last) = (self.0 >> COORDINATE_BITS & MASK, self.0 & MASK);
         for level in (0..=self.level().min(LAST_LEVEL)).rev() {
             let [columns, rows] = reach(level, region);
@@ -116,6 +120,12 @@ mod tests {
         assert_eq!(Cell::of(&[100_000, 110_000, -50_000, -49_998, 0, 0]).corner(), [65_536, -65_536]);
         let whole = [i64::from(i32::MIN), i64::from(i32::MAX), 0, 0, 0, 0];
         assert_eq!(Cell::of(&whole).corner(), [i64::from(i32::MIN); 2]);
+    }
+
+    #[test]
+    fn there_is_no_cell_before_a_number_below_all() {
+        let whole = [i32::MIN, i32::MAX, i32::MIN, i32::MAX, 0, 0].map(i64::from);
+        assert_eq!((Cell::numbered(-1).down_to(&whole), Cell::numbered(i64::MIN).down_to(&whole)), (None, None));
     }
 
     #[test]

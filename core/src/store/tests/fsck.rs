@@ -152,6 +152,11 @@ const DAMAGE: &[(&str, &str)] = &[
     ("UPDATE version SET e1 = e1 + 1 WHERE version = 1", "versions: version 1: has envelope"),
     ("UPDATE version SET hash = zeroblob(32) WHERE version = 1", "versions: version 2: has hash"),
     ("UPDATE meta SET crs = 'EPSG:2056'", "versions: version 0: has hash"),
+    ("UPDATE version SET reverts = 1 WHERE version = 3", "versions: version 3: a version of kind revert, and no other"),
+    (
+        "UPDATE version SET kind = 'revert' WHERE version = 3",
+        "versions: version 3: a version of kind revert, and no other",
+    ),
     ("UPDATE version SET kind = 'import' WHERE version = 0", "versions: version 0: version 0, and no other"),
     // Classes.
     ("DELETE FROM class WHERE from_version = 4 AND class = 3", "classes: version 4: class \"banner\" is lost"),

@@ -99,3 +99,14 @@ fn an_index_that_names_a_row_too_many_is_not_believed() {
     let error = scratch.map.snapshot(VersionId(61)).unwrap().features(Some(&everywhere())).unwrap_err();
     assert!(error.to_string().contains("the index names 30 states, of which 29 are there"), "{error}");
 }
+
+#[test]
+fn a_cell_with_a_number_below_all_is_found_and_no_question_goes_round_for_ever() {
+    let scratch = busy_corner();
+    damage(&scratch, "UPDATE feature_index SET cell = -cell");
+    let snapshot = scratch.map.snapshot(VersionId(61)).unwrap();
+    assert!(snapshot.features(Some(&everywhere())).unwrap().is_empty());
+    assert!(!scratch.map.fsck().unwrap().is_empty());
+    scratch.map.repair().unwrap();
+    assert_eq!(snapshot.features(Some(&everywhere())), snapshot.features(None));
+}

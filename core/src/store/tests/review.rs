@@ -84,6 +84,11 @@ fn what_is_confirmed_closes_its_proposals_or_nothing_happens() {
     assert_eq!(late, Err(CommitError::Store(decided)));
     assert_eq!((scratch.map.head(), status(third)), (Ok(VersionId(2)), ProposalStatus::Open));
     assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+    // What confirmed the version is evidence that must be there.
+    fsck::damage(&scratch, "DELETE FROM observation WHERE id <= 3");
+    let problems: Vec<String> = scratch.map.fsck().unwrap().iter().map(ToString::to_string).collect();
+    let expected = format!("observations: observation 4: is confirmed by observation {digest}, which is not there");
+    assert!(problems.contains(&expected), "{problems:#?}");
 }
 
 #[test]
