@@ -6,8 +6,8 @@ use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
 use resurvey_core::store::{History, MapFile, Provenance, RecordedObservation};
-use resurvey_core::version::{Fid, Observation, Side, VersionId};
-use resurvey_schema::ClassTable;
+use resurvey_core::version::{Fid, LocalizationEvidence, Observation, PluginUse, Side, VersionId};
+use resurvey_schema::{ClassTable, Intrinsics};
 use serde_json::{Value, json};
 
 /// The evidence behind a feature, newest step first.
@@ -66,8 +66,19 @@ pub(super) fn observation(
 }
 
 fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
-    let Observation { capture, taken_at, prior, localization, plugins, gates, rejections, decision, .. } =
-        &recorded.observation;
+    let Observation {
+        capture,
+        taken_at,
+        prior,
+        camera,
+        search,
+        localization,
+        plugins,
+        gates,
+        rejections,
+        decision,
+        ..
+    } = &recorded.observation;
     json!({
         "id": recorded.id,
         "sha256": recorded.digest.to_string(),
@@ -82,10 +93,18 @@ fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
             "yaw_sigma_deg": prior.yaw_sigma_rad.to_degrees(),
             "tilt_sigma_deg": prior.tilt_sigma_rad.to_degrees(),
         })),
+        "camera": camera.as_ref().map(|camera| json!({
+            "model": camera.model.name(), "width": camera.width, "height": camera.height, "fx": camera.fx,
+            "fy": camera.fy, "cx": camera.cx, "cy": camera.cy, "distortion": camera.distortion,
+        })),
+        "search": search.map(|search| json!({
+            "radius_m": search.radius_m, "yaw_range_deg": search.yaw_range_deg,
+        })),
         "localization": localization.as_ref().map(|found| json!({
             "pose": found.pose,
             "score": found.score,
             "covariance": found.covariance,
+            "alignment": found.alignment,
             "runner_up": found.runner_up.map(|other| json!({
                 "distance_m": other.distance_m, "score_ratio": other.score_ratio,
             })),
@@ -155,25 +174,9 @@ fn print_single(
     if let Some(digest) = recorded.labels {
         console.line(format_args!("  labels    sha256 {digest}"))?;
     }
-    if let Some(prior) = &seen.prior {
-        console.line(format_args!("  prior     {}", pose_text(&prior.pose)))?;
-        console.line(format_args!(
-            "            1 sigma {:.2} m in plan, {:.2} m in height, {:.1}° heading",
-            prior.position_sigma_m,
-            prior.height_sigma_m,
-            prior.yaw_sigma_rad.to_degrees()
-        ))?;
-    }
+    print_input(seen, console)?;
     if let Some(found) = &seen.localization {
-        console.line(format_args!("  pose      {}", pose_text(&found.pose)))?;
-        let [e, n, yaw] = [0, 1, 2].map(|axis| found.covariance[axis][axis].max(0.0).sqrt());
-        let score = found.score.map_or_else(|| "none: the pose was given".to_owned(), |score| format!("{score:.4}"));
-        let yaw_deg = yaw.to_degrees();
-        console.line(format_args!("            score {score}, 1 sigma E {e:.3} m N {n:.3} m heading {yaw_deg:.3}°"))?;
-        if let Some(other) = found.runner_up {
-            let (distance_m, ratio) = (other.distance_m, other.score_ratio);
-            console.line(format_args!("            runner-up {distance_m:.1} m away, {ratio:.3} of the score"))?;
-        }
+        print_pose(found, console)?;
     }
     for gate in &seen.gates {
         let verdict = if gate.passed { "passed" } else { "failed" };
@@ -183,9 +186,7 @@ fn print_single(
         ))?;
     }
     for used in &seen.plugins {
-        let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
-        console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
-        console.line(format_args!("            {}", used.settings))?;
+        print_plugin(used, console)?;
     }
     for rejection in &seen.rejections {
         let (before, after) = (classes.name(rejection.class_before), classes.name(rejection.class_after));
@@ -193,6 +194,62 @@ fn print_single(
             "  rejected  {before} -> {after}, {} px: {} is {:.3} {}, limit {:.3}",
             rejection.pixels, rejection.requirement, rejection.measured, rejection.unit, rejection.limit
         ))?;
+    }
+    Ok(())
+}
+
+/// Camera, prior, and how far around it the pose was looked for.
+fn print_input(seen: &Observation, console: &mut Console<'_>) -> Result<(), Failure> {
+    if let Some(camera) = &seen.camera {
+        let Intrinsics { width, height, fx, fy, cx, cy, distortion, .. } = camera;
+        console.line(format_args!("  camera    {}, {width} x {height} px", camera.model.name()))?;
+        console.line(format_args!("            fx {fx} fy {fy} cx {cx} cy {cy}, distortion {distortion:?}"))?;
+    }
+    if let Some(prior) = &seen.prior {
+        console.line(format_args!("  prior     {}", pose_text(&prior.pose)))?;
+        console.line(format_args!(
+            "            1 sigma {:.2} m in plan, {:.2} m in height, {:.1}° heading, {:.1}° tilt",
+            prior.position_sigma_m,
+            prior.height_sigma_m,
+            prior.yaw_sigma_rad.to_degrees(),
+            prior.tilt_sigma_rad.to_degrees()
+        ))?;
+    }
+    if let Some(search) = &seen.search {
+        console.line(format_args!("  search    {} m and {}° around it", search.radius_m, search.yaw_range_deg))?;
+    }
+    Ok(())
+}
+
+fn print_pose(found: &LocalizationEvidence, console: &mut Console<'_>) -> Result<(), Failure> {
+    console.line(format_args!("  pose      {}", pose_text(&found.pose)))?;
+    let [e, n, yaw] = [0, 1, 2].map(|axis| found.covariance[axis][axis].max(0.0).sqrt());
+    let score = found.score.map_or_else(|| "none: the pose was given".to_owned(), |score| format!("{score:.4}"));
+    let yaw_deg = yaw.to_degrees();
+    console.line(format_args!("            score {score}, 1 sigma E {e:.3} m N {n:.3} m heading {yaw_deg:.3}°"))?;
+    if let Some(aligned) = &found.alignment {
+        let [height, pitch, roll] = [3, 4, 5].map(|axis| aligned.covariance[axis][axis].max(0.0).sqrt());
+        let (pitch_deg, roll_deg) = (pitch.to_degrees(), roll.to_degrees());
+        console.line(format_args!(
+            "            aligned: 1 sigma H {height:.3} m pitch {pitch_deg:.3}° roll {roll_deg:.3}°, walls {:.3} m off the map, \
+             contours {:.3} px",
+            aligned.map_sigma_m, aligned.label_sigma_px
+        ))?;
+    }
+    if let Some(other) = found.runner_up {
+        let (distance_m, ratio) = (other.distance_m, other.score_ratio);
+        console.line(format_args!("            runner-up {distance_m:.1} m away, {ratio:.3} of the score"))?;
+    }
+    Ok(())
+}
+
+fn print_plugin(used: &PluginUse, console: &mut Console<'_>) -> Result<(), Failure> {
+    let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
+    console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
+    let digest = used.settings_sha256.map_or_else(String::new, |digest| format!(", sha256 {digest}"));
+    console.line(format_args!("            settings {}{digest}", used.settings))?;
+    for file in &used.files {
+        console.line(format_args!("            {} sha256 {}", file.setting, file.sha256))?;
     }
     Ok(())
 }

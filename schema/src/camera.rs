@@ -11,6 +11,17 @@ pub enum CameraModel {
     Fisheye,
 }
 
+impl CameraModel {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::Brown => "brown",
+            Self::Fisheye => "fisheye",
+        }
+    }
+}
+
 /// Checked intrinsics: sizes above zero, finite numbers, focal lengths above zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {

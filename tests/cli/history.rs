@@ -98,6 +98,34 @@ fn why_names_the_capture_the_plugins_and_the_gates() {
 }
 
 #[test]
+fn why_has_the_whole_evidence_as_text_too() {
+    let bench = Bench::with_street();
+    let capture = crate::bench::street().path("capture/capture.json");
+    let document = bench.json("update", &[text(&capture)]);
+    let fid = document["changes"][0]["fid"].to_string();
+    let seen = bench.json("why", &[&fid])["steps"][0]["observation"].clone();
+    assert_eq!(seen["localization"]["alignment"], document["localization"]["alignment"]);
+    let lines = bench.run("why", &[&fid]).ok().out;
+    let (camera, search) = (&seen["camera"], &seen["search"]);
+    let mut words = vec![
+        format!("camera    {}, {} x {} px", camera["model"].as_str().unwrap(), camera["width"], camera["height"]),
+        format!("fx {} fy", camera["fx"].as_f64().unwrap()),
+        format!(
+            "search    {} m and {}°",
+            search["radius_m"].as_f64().unwrap(),
+            search["yaw_range_deg"].as_f64().unwrap()
+        ),
+        "aligned: 1 sigma H".to_owned(),
+    ];
+    words.extend(
+        seen["plugins"].as_array().unwrap().iter().map(|used| used["settings_sha256"].as_str().unwrap().to_owned()),
+    );
+    for word in words {
+        assert!(lines.contains(&word), "{word:?} is not in {lines}");
+    }
+}
+
+#[test]
 fn why_of_an_imported_object_says_that_there_is_no_capture() {
     let bench = Bench::with_street();
     let first = bench.json("query", &[])["features"][0]["fid"].to_string();

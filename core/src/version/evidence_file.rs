@@ -202,13 +202,11 @@ fn prior_from_file(file: &PriorFile) -> Prior {
     }
 }
 
-const MODELS: [(CameraModel, &str); 3] =
-    [(CameraModel::Pinhole, "pinhole"), (CameraModel::Brown, "brown"), (CameraModel::Fisheye, "fisheye")];
+const MODELS: [CameraModel; 3] = [CameraModel::Pinhole, CameraModel::Brown, CameraModel::Fisheye];
 
 fn camera_to_file(camera: &Intrinsics) -> IntrinsicsFile {
-    let name = MODELS.iter().find(|(model, _)| *model == camera.model).map_or("pinhole", |(_, name)| name);
     IntrinsicsFile {
-        model: name.to_owned(),
+        model: camera.model.name().to_owned(),
         width: camera.width,
         height: camera.height,
         fx: Number(camera.fx),
@@ -220,7 +218,7 @@ fn camera_to_file(camera: &Intrinsics) -> IntrinsicsFile {
 }
 
 fn camera_from_file(file: &IntrinsicsFile) -> Result<Intrinsics, String> {
-    let model = MODELS.iter().find(|(_, name)| *name == file.model).map(|(model, _)| *model);
+    let model = MODELS.into_iter().find(|model| model.name() == file.model);
     Ok(Intrinsics {
         model: model.ok_or_else(|| format!("unknown camera model {:?}", file.model))?,
         width: file.width,
