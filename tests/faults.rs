@@ -1,7 +1,8 @@
 //! What a map is after its writer was killed, its disk failed or filled up, its log was lost, or bits of it flipped: at
 //! the old version or the new one, and whole; or what is wrong is found. Through the built binary.
 //!
-//! Each test takes a sample of the places where something can fail; `cargo test --test faults -- --ignored` takes all.
+//! Every write and sync of every command fails in turn. Of bits that flip and of lengths of a log a sample is taken;
+//! `cargo test --test faults -- --ignored` takes thousands of bits and every length, which is hours.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may fail loudly")]
 
 #[path = "faults/bits.rs"]

@@ -3,9 +3,10 @@
 use crate::job::{copy, jobs};
 use crate::observed::{Observed, run};
 use std::fs;
+use std::path::Path;
 
-const SAMPLED: usize = 150;
-const ALL: usize = 20_000;
+const SAMPLED: usize = 100;
+const MANY: usize = 8_000;
 
 /// Pseudo-random numbers (Marsaglia's xorshift), the same in every run.
 struct Random(u64);
@@ -19,9 +20,9 @@ impl Random {
     }
 }
 
-fn flips(count: usize, seed: u64) {
+fn flips(template: &Path, count: usize, seed: u64) {
     let directory = tempfile::tempdir().unwrap();
-    let map = copy(&jobs().eventful, directory.path());
+    let map = copy(template, directory.path());
     let (bytes, whole) = (fs::read(&map).unwrap(), Observed::of(&map));
     let (mut random, mut found, mut harmless) = (Random(seed), 0, 0);
     for round in 0..count {
@@ -55,11 +56,22 @@ fn flips(count: usize, seed: u64) {
 
 #[test]
 fn a_bit_that_flips_is_found_or_harmless() {
-    flips(SAMPLED, 5);
+    flips(&jobs().eventful, SAMPLED, 5);
 }
 
 #[test]
-#[ignore = "many minutes"]
-fn twenty_thousand_bits_that_flip_are_found_or_harmless() {
-    flips(ALL, 11);
+fn a_bit_that_flips_in_a_map_that_forgot_is_found_or_harmless() {
+    flips(&jobs().forgetful, SAMPLED, 7);
+}
+
+#[test]
+#[ignore = "an hour"]
+fn thousands_of_bits_that_flip_are_found_or_harmless() {
+    flips(&jobs().eventful, MANY, 11);
+}
+
+#[test]
+#[ignore = "an hour"]
+fn thousands_of_bits_that_flip_in_a_map_that_forgot_are_found_or_harmless() {
+    flips(&jobs().forgetful, MANY, 13);
 }

@@ -1,7 +1,7 @@
 //! The commands that write, each with a map to write to, and what the map is before and after.
 
 use crate::common::{Place, path};
-use crate::observed::Observed;
+use crate::observed::{Observed, run};
 use crate::synthetic::{ChangeKind, NoiseLevel, Scene, SceneKind};
 use serde_json::json;
 use std::fs;
@@ -50,6 +50,8 @@ pub struct Jobs {
     pub all: Vec<Job>,
     /// A map with everything that a map can have.
     pub eventful: PathBuf,
+    /// The same after all was forgotten but what has a tag, and the newest.
+    pub forgetful: PathBuf,
     /// A change set that every map takes.
     pub chair: PathBuf,
     _place: Place,
@@ -91,11 +93,13 @@ pub fn jobs() -> &'static Jobs {
         ok("update", &[capture, "--pose", pose, "--propose"]);
         let eventful = now("eventful.rsv");
         all.push(Job::new("gc", &["--forget-before", "head"], eventful.clone()));
+        let forgetful = now("forgetful.rsv");
+        assert_eq!(run("gc", &forgetful, &["--forget-before", "head"]).code, 0);
         // The first command that writes to a map of an older format migrates it with what it writes.
         let older = place.path("format-2.rsv");
         fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/map-format-2.rsv"), &older).unwrap();
         all.push(Job::new("apply", &[chair_set], older));
-        Jobs { all, eventful, chair, _place: place }
+        Jobs { all, eventful, forgetful, chair, _place: place }
     })
 }
 
