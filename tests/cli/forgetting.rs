@@ -135,10 +135,10 @@ fn fixture(name: &str) -> PathBuf {
 
 #[test]
 fn a_map_of_every_format_so_far_opens_unchanged_and_takes_another_version() {
-    for (name, format) in [("map-format-1.rsv", 1), ("map-format-2.rsv", 2), ("map-format-3.rsv", 3)] {
+    for (name, format) in (1..=4).map(|format| (format!("map-format-{format}.rsv"), format)) {
         let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join(name);
-        std::fs::copy(fixture(name), &path).unwrap();
+        let path = directory.path().join(&name);
+        std::fs::copy(fixture(&name), &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let map = text(&path);
         let json = |words: &[&str]| {
@@ -170,6 +170,8 @@ fn a_map_of_every_format_so_far_opens_unchanged_and_takes_another_version() {
         ] {
             assert_eq!(resurvey(words).code, code, "{words:?}");
         }
+        assert_eq!(resurvey(&["gc", map]).ok().out, "nothing to remove\n");
+        assert_eq!(json(&["fsck", map, "--repair"])["repaired"], json!([]));
         assert_eq!((std::fs::read(&path).unwrap() == bytes, format_of()), (true, format), "{name}");
         json(&["proposals", map, "accept", "1"]);
         assert_eq!((json(&["query", map])["version"].as_u64(), format_of()), (Some(head + 1), 4), "{name}");

@@ -48,16 +48,18 @@ impl MapFile {
     /// more: all of it or nothing. Without `before` no version is forgotten. Of a damaged map nothing is: what seems to be
     /// used by nobody may be what the damaged part asks for, and what proves the rest goes with what is forgotten.
     pub fn gc(&self, before: Option<VersionId>, now: Timestamp) -> Result<Forgetting, StoreError> {
+        let planned = self.gc_plan(before)?;
+        if planned.is_empty() {
+            return Ok(planned);
+        }
         self.write(|connection| -> Result<Forgetting, WriteFault<StoreError>> {
             let plan = plan(connection, before)?;
             if let Some(first) = fsck::damage(connection, &self.path)?.first() {
                 return Err(Fault::Damage(format!("{first}; nothing was forgotten or removed")).into());
             }
-            if !plan.forgetting().is_empty() {
-                forget(connection, &plan, now)?;
-                remove(connection, &plan)?;
-                write_kept_states(connection)?;
-            }
+            forget(connection, &plan, now)?;
+            remove(connection, &plan)?;
+            write_kept_states(connection)?;
             Ok(plan.forgetting())
         })
     }

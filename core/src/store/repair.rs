@@ -14,6 +14,9 @@ impl MapFile {
     /// where nothing else is wrong with the map: all of it or nothing. Returns what it did. Everything else that
     /// [`MapFile::fsck`] finds is left as it is.
     pub fn repair(&self) -> Result<Vec<Problem>, StoreError> {
+        if self.fsck()?.is_empty() {
+            return Ok(Vec::new());
+        }
         self.write(|connection| -> Result<Vec<Problem>, WriteFault<StoreError>> {
             let mut done = Vec::new();
             mend_sqlite_indexes(connection, &mut done)?;

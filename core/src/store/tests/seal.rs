@@ -4,14 +4,14 @@ use super::forget::moving;
 use super::fsck::{damage, eventful};
 use super::*;
 use crate::store::StoreError;
-use crate::version::{Delta, Digest};
+use crate::version::{BoxMm, Delta, Digest};
 
 /// A map with a row in every table that has seals, and what `fsck` says of it.
 fn sealed() -> Scratch {
     let scratch = eventful();
     let mut update = transaction(4);
     update.additions = vec![chair(200.0)];
-    update.viewed_region = Some(crate::version::BoxMm::of_plan(835_000.0, 818_000.0, 836_000.0, 818_100.0).unwrap());
+    update.viewed_region = Some(BoxMm::of_plan(835_000.0, 818_000.0, 836_000.0, 818_100.0).unwrap());
     update.idempotency_key = Some("photo 12".to_owned());
     scratch.map.commit(&update, at(7)).unwrap();
     scratch.map.gc(Some(VersionId(3)), at(8)).unwrap();
@@ -161,4 +161,66 @@ fn a_seal_is_the_one_of_the_documentation() {
     // docs/file-format.md, the example there; python3 docs/verify_chain.py computes it likewise.
     let expected = "db29079f8deef492385ce4fa7eb039ab975ca927c36d4f9909c56dd3e768863e";
     assert_eq!(Digest(seal).to_string(), expected);
+}
+
+/// All that a map tells, as text.
+fn told(map: &MapFile) -> String {
+    let mut said = vec![format!("{:?}", (map.info(), map.log(None), map.tags(), map.proposals(), map.observations()))];
+    let everywhere = BoxMm::of_plan(0.0, 0.0, 1e6, 1e6).unwrap();
+    said.push(format!("{:?}", map.log(Some(&everywhere))));
+    for version in (0..=map.head().map_or(0, |head| head.0)).map(VersionId) {
+        let features = [None, Some(&everywhere)].map(|region| map.features(version, region));
+        said.push(format!("{features:?} {:?} {:?}", map.classes(version), map.request_of(version)));
+        for minute in [0, 3, 7, 11, 30] {
+            said.push(format!("{:?}", map.features_observed(version, at(minute), Some(&everywhere))));
+        }
+    }
+    for fid in (1..9).map(Fid) {
+        said.push(format!("{:?} {:?}", map.why(fid), map.log_of(fid)));
+    }
+    for digest in [&b"a mesh"[..], b"png", b"blurred"].map(Digest::of) {
+        said.push(format!("{:?} {:?}", map.geometry(digest), map.label_image(digest)));
+    }
+    said.join("\n")
+}
+
+/// Flips a bit of every so many bytes of the stored map, another from byte to byte.
+fn every_flip_is_found_or_changes_no_answer(step: usize) {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path().join("flipped.rsv");
+    let bytes = std::fs::read(fixture::fixture(4)).unwrap();
+    std::fs::write(&path, &bytes).unwrap();
+    let whole = told(&MapFile::open_read_only(&path).unwrap());
+    let (mut found, mut harmless) = (0, 0);
+    for (round, byte) in (0..bytes.len()).step_by(step).enumerate() {
+        let mut flipped = bytes.clone();
+        flipped[byte] ^= 1 << (round % 8);
+        std::fs::write(&path, &flipped).unwrap();
+        let map = MapFile::open_read_only(&path);
+        let is_sound = map.as_ref().is_ok_and(|map| map.fsck() == Ok(Vec::new()));
+        if is_sound {
+            let now = map.as_ref().map(told).unwrap_or_default();
+            assert!(
+                now == whole,
+                "bit {} of byte {byte}: fsck finds nothing and the map tells something else",
+                round % 8
+            );
+            harmless += 1;
+        } else {
+            found += 1;
+        }
+    }
+    println!("{found} flips found, {harmless} harmless");
+    assert!(found > 0 && harmless > 0);
+}
+
+#[test]
+fn a_bit_that_flips_is_found_or_changes_no_answer() {
+    every_flip_is_found_or_changes_no_answer(97);
+}
+
+#[test]
+#[ignore = "a bit of every byte: minutes"]
+fn a_bit_of_any_byte_that_flips_is_found_or_changes_no_answer() {
+    every_flip_is_found_or_changes_no_answer(1);
 }
