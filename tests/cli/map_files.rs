@@ -1,8 +1,12 @@
 //! Map files that are no maps, newer, damaged, read-only or in use: exit codes 11, 13 and 21.
 
 use crate::bench::{Bench, noise, resurvey, street, text};
+use jiff::Timestamp;
+use resurvey_core::store::{History, MapFile};
+use resurvey_core::version::VersionId;
 use rusqlite::Connection;
 use std::fs;
+use std::process::Command;
 
 /// Command lines that open a map, by their words after it; the last three write.
 fn commands(bench: &Bench) -> Vec<Vec<String>> {
@@ -151,4 +155,27 @@ fn a_map_that_another_writes_is_exit_21_after_a_wait() {
     drop(writer);
     bench.run("apply", &[&changes]).ok();
     assert_eq!(bench.head(), 2);
+}
+
+#[test]
+fn a_map_that_one_process_has_open_twice_loses_nothing_to_another_process() {
+    // POSIX takes all locks of a process from a file as soon as it closes one descriptor of it
+    // (https://sqlite.org/howtocorrupt.html, 2.2). A process that ends then finds the map unused, and removes the log that
+    // this one writes to.
+    let bench = Bench::with_empty_map();
+    let path = bench.path("map.rsv");
+    let tag_elsewhere = |name: &str| {
+        let status = Command::new(env!("CARGO_BIN_EXE_resurvey")).arg("tag").arg(&path).arg(name).status().unwrap();
+        assert!(status.success());
+    };
+    let first = MapFile::open(&path).unwrap();
+    drop(MapFile::open(&path).unwrap());
+    drop(MapFile::open_read_only(&path).unwrap());
+    tag_elsewhere("before");
+    first.tag("during", VersionId(0), Timestamp::UNIX_EPOCH).unwrap();
+    tag_elsewhere("after");
+    drop(first);
+    let tags = bench.json("tag", &[]);
+    let names: Vec<&str> = tags["tags"].as_array().unwrap().iter().map(|tag| tag["tag"].as_str().unwrap()).collect();
+    assert_eq!(names, ["after", "before", "during"]);
 }

@@ -230,7 +230,9 @@ fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
         rusqlite::Error::SqliteFailure(failure, _) => match failure.code {
             ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { path },
             ErrorCode::DatabaseCorrupt => StoreError::Damaged { path, detail },
-            ErrorCode::NotADatabase => StoreError::NotAMap { path, found: "no SQLite database".to_owned() },
+            ErrorCode::NotADatabase => {
+                StoreError::NotAMap { path, found: "another kind of file, or one that lost its header".to_owned() }
+            }
             ErrorCode::ReadOnly => StoreError::ReadOnly { path },
             ErrorCode::DiskFull => StoreError::Full { path },
             ErrorCode::CannotOpen => {

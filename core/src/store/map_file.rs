@@ -3,16 +3,18 @@
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::index::{build_beside, rebuild};
-use super::rows::{VersionRow, check_classes, insert_classes};
+use super::on_disk::{has_write_ahead_log, immutable_uri, inspect, is_marked_read_only, unless_cut};
+use super::rows::{VersionRow, check_classes, head, insert_classes};
+use super::turn::{Turn, Turns};
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, named_params};
+use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
-use std::io::Read;
+use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -31,6 +33,9 @@ pub struct MapFile {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
     writable: bool,
+    /// Of a map that is open to write.
+    turns: Option<Turns>,
+    patience: Cell<Duration>,
 }
 
 /// What a new map is made of.
@@ -75,7 +80,7 @@ impl MapFile {
         let made = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
             .map_err(|fault| fault.at(path))
             .and_then(|map| map.write(|connection| fill(connection, new, now)).map(|()| map))
-            .and_then(|map| map.use_write_ahead_log().map(|()| map));
+            .and_then(Self::with_write_ahead_log);
         if made.is_err() {
             // The file is ours: create_new made it. Nothing of use is in it.
             let _ = fs::remove_file(path);
@@ -89,12 +94,13 @@ impl MapFile {
         if is_marked_read_only(path) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
-        let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path))?;
+        let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path));
+        let map = unless_cut(path, map)?;
         let format = map.check_format()?;
         if map.connection.is_readonly(rusqlite::MAIN_DB).unwrap_or(true) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
-        map.use_write_ahead_log()?;
+        let map = map.with_write_ahead_log()?;
         if (format as usize) < MIGRATIONS.len() {
             map.write(migrate)?;
         }
@@ -111,8 +117,9 @@ impl MapFile {
             } else {
                 Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
             };
-            let map = map.map_err(|fault| fault.at(path))?;
-            if (map.check_format()? as usize) < INDEX_FORMAT {
+            let map = unless_cut(path, map.map_err(|fault| fault.at(path)))?;
+            let format = map.check_format()?;
+            if (format as usize) < INDEX_FORMAT {
                 map.outside(|connection| Ok(connection.pragma_update(None, "temp_store", "MEMORY")?))?;
                 map.read(build_beside)?;
             }
@@ -133,6 +140,7 @@ impl MapFile {
 
     /// Waits this long for another writer instead of five seconds.
     pub fn set_busy_timeout(&self, timeout: Duration) -> Result<(), StoreError> {
+        self.patience.set(timeout);
         self.connection.busy_timeout(timeout).map_err(|error| Fault::Sql(error).at(&self.path))
     }
 
@@ -174,7 +182,12 @@ impl MapFile {
         work(&self.connection).map_err(|fault| fault.at(&self.path))
     }
 
-    /// Runs `work` in one immediate transaction: all of it or nothing.
+    /// Runs `work`, in which reads and writes are one transaction: all of it or nothing, and nobody else writes meanwhile.
+    pub fn together<T, E: From<StoreError>>(&self, work: impl FnOnce(&Self) -> Result<T, E>) -> Result<T, E> {
+        self.write(|_| work(self).map_err(WriteFault::Refused))
+    }
+
+    /// Runs `work` in one immediate transaction, or as a part of the one that is under way: all of it or nothing.
     ///
     /// Immediate, because a reading transaction that wants to write later is refused at once when another writer was
     /// faster, whatever the busy timeout.
@@ -186,12 +199,33 @@ impl MapFile {
         if !self.writable {
             return Err(StoreError::ReadOnly { path: self.path.clone() }.into());
         }
-        let begin = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
-        let transaction = begin.map_err(|error| at(error.into()))?;
-        match work(&transaction) {
-            Ok(value) => transaction.commit().map(|()| value).map_err(|error| at(error.into())),
+        let ended = |ended: Result<T, WriteFault<E>>| match ended {
+            Ok(value) => Ok(value),
             Err(WriteFault::Fault(fault)) => Err(at(fault)),
             Err(WriteFault::Refused(error)) => Err(error),
+        };
+        if !self.connection.is_autocommit() {
+            let part = |sql: &str| self.connection.execute_batch(sql).map_err(|error| at(error.into()));
+            part("SAVEPOINT part")?;
+            let done = work(&self.connection);
+            part(if done.is_ok() { "RELEASE part" } else { "ROLLBACK TO part; RELEASE part" })?;
+            return ended(done);
+        }
+        let _turn = self.take_turn()?;
+        let begin = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
+        let transaction = begin.map_err(|error| at(error.into()))?;
+        let value = ended(work(&transaction))?;
+        transaction.commit().map(|()| value).map_err(|error| at(error.into()))
+    }
+
+    /// Waits until no other writer is under way; a map without a write-ahead log has none.
+    pub(super) fn take_turn(&self) -> Result<Option<Turn<'_>>, StoreError> {
+        let Some(turns) = &self.turns else { return Ok(None) };
+        let path = || self.path.clone();
+        match turns.take(self.patience.get()) {
+            Ok(Some(turn)) => Ok(Some(turn)),
+            Ok(None) => Err(StoreError::Busy { path: path() }),
+            Err(error) => Err(StoreError::Io { path: path(), detail: format!("its log cannot be locked: {error}") }),
         }
     }
 
@@ -204,7 +238,8 @@ impl MapFile {
     }
 
     fn connect_to(path: &Path, target: impl AsRef<Path>, flags: OpenFlags) -> Result<Self, Fault> {
-        let connection = Connection::open_with_flags(target, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        let connection = Connection::open_with_flags(target, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)
+            .map_err(|error| StoreError::Io { path: path.to_owned(), detail: error.to_string() })?;
         connection.busy_timeout(BUSY_TIMEOUT)?;
         connection.set_prepared_statement_cache_capacity(64);
         connection.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
@@ -221,15 +256,22 @@ impl MapFile {
         }
         connection.pragma_update(None, "synchronous", "FULL")?;
         let writable = flags.contains(OpenFlags::SQLITE_OPEN_READ_WRITE);
-        Ok(Self { connection, path: path.to_owned(), writable })
+        Ok(Self { connection, path: path.to_owned(), writable, turns: None, patience: Cell::new(BUSY_TIMEOUT) })
     }
 
-    fn use_write_ahead_log(&self) -> Result<(), StoreError> {
+    fn with_write_ahead_log(mut self) -> Result<Self, StoreError> {
         let set = |connection: &Connection| -> Result<String, Fault> {
             Ok(connection.pragma_update_and_check(None, "journal_mode", "WAL", |row| row.get(0))?)
         };
         match self.outside(set)?.as_str() {
-            "wal" => Ok(()),
+            // A locked file of Windows cannot be read by others.
+            "wal" if cfg!(unix) => {
+                // The first read opens the log.
+                self.read(head)?;
+                self.turns = Some(Turns::of(&self.path).map_err(|fault| fault.at(&self.path))?);
+                Ok(self)
+            }
+            "wal" => Ok(self),
             mode => Err(StoreError::NoWriteAheadLog {
                 path: self.path.clone(),
                 detail: format!("the file system allows only journal mode {mode:?}"),
@@ -328,62 +370,4 @@ pub(super) fn first_version(new: &NewMap, now: Timestamp) -> VersionRecord {
         evidence: None,
         hash: version_hash(None, operations, None),
     }
-}
-
-/// Refuses what is plainly not a map before SQLite sees it.
-fn inspect(path: &Path) -> Result<(), StoreError> {
-    const MAGIC: &[u8] = b"SQLite format 3\0";
-    const HEADER_BYTES: u64 = 100;
-    let not_a_map = |found: &str| StoreError::NotAMap { path: path.to_owned(), found: found.to_owned() };
-    let metadata = fs::metadata(path).map_err(|error| io_error(path, &error))?;
-    if !metadata.is_file() {
-        return Err(not_a_map("a directory or device"));
-    }
-    if metadata.len() == 0 {
-        return Err(not_a_map("an empty file"));
-    }
-    let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
-    read.map_err(|error| io_error(path, &error))?;
-    if !start.starts_with(MAGIC) {
-        return Err(not_a_map("another kind of file"));
-    }
-    // A crash while the log is written back may leave part of a page, which the log then mends.
-    let page_bytes = start.get(16..18).map_or(0, |size| u64::from(u16::from_be_bytes([size[0], size[1]])));
-    let is_cut = page_bytes > 1 && metadata.len() % page_bytes != 0 && !has_write_ahead_log(path);
-    if metadata.len() < HEADER_BYTES || is_cut {
-        let detail = format!("it ends after {} bytes", metadata.len());
-        return Err(StoreError::Damaged { path: path.to_owned(), detail });
-    }
-    Ok(())
-}
-
-fn io_error(path: &Path, error: &std::io::Error) -> StoreError {
-    match error.kind() {
-        std::io::ErrorKind::NotFound => StoreError::NotFound { path: path.to_owned() },
-        _ => StoreError::Io { path: path.to_owned(), detail: error.to_string() },
-    }
-}
-
-/// Whether the marks on the file forbid writing, also to a user who could write all the same.
-fn is_marked_read_only(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|metadata| metadata.permissions().readonly())
-}
-
-fn has_write_ahead_log(path: &Path) -> bool {
-    let mut log = path.as_os_str().to_owned();
-    log.push("-wal");
-    fs::metadata(log).is_ok_and(|metadata| metadata.len() > 0)
-}
-
-/// A URI that tells SQLite that nobody writes to the file.
-fn immutable_uri(path: &Path) -> String {
-    let mut uri = "file:".to_owned();
-    for character in path.to_string_lossy().chars() {
-        match character {
-            '%' | '?' | '#' => uri += &format!("%{:02X}", character as u32),
-            _ => uri.push(character),
-        }
-    }
-    uri + "?immutable=1"
 }

@@ -14,7 +14,6 @@ mod feature_rows;
 mod forgotten;
 mod fsck;
 mod gc;
-
 mod index;
 mod interface;
 mod logs;
@@ -23,6 +22,7 @@ mod map_file;
 mod memory;
 mod observations;
 mod observed;
+mod on_disk;
 mod operations;
 mod plan;
 mod proposals;
@@ -34,6 +34,7 @@ mod snapshot;
 mod states;
 #[cfg(test)]
 mod tests;
+mod turn;
 
 pub use commit_error::{CommitError, ConflictingChange};
 pub use error::StoreError;

@@ -110,6 +110,22 @@ fn another_writer_is_waited_for_and_then_named() {
 }
 
 #[test]
+fn a_writer_waits_for_the_turn_of_another_until_it_ends() {
+    let scratch = Scratch::with_two_features();
+    let other = MapFile::open(scratch.map.path()).unwrap();
+    scratch.map.set_busy_timeout(Duration::from_millis(20)).unwrap();
+    let turn = other.take_turn().unwrap();
+    let path = scratch.map.path().to_owned();
+    assert_eq!(scratch.add(1, &[chair(1.0)]), Err(CommitError::Store(StoreError::Busy { path: path.clone() })));
+    // Writing the file anew moves the log too.
+    assert_eq!(scratch.map.compact(), Err(StoreError::Busy { path }));
+    assert_eq!(scratch.map.head(), Ok(VersionId(1)));
+    drop(turn);
+    assert_eq!(scratch.add(1, &[chair(1.0)]), Ok(VersionId(2)));
+    assert_eq!(scratch.map.compact(), Ok(()));
+}
+
+#[test]
 fn a_map_says_what_its_coordinates_mean() {
     let scratch = Scratch::new();
     let info = MapFile::open(scratch.map.path()).unwrap().info().unwrap();
