@@ -7,8 +7,9 @@ use super::feature_rows::{insert_geometries, last_fid, write_rows};
 use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
 use super::observations::Evidence;
-use super::plan::{check_new_classes, check_request, check_states, plan};
+use super::plan::{check_new_classes, check_numbers, check_request, check_states, plan};
 use super::rows::{VersionRow, classes_at, head, insert_classes};
+use super::states::last_state;
 use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
@@ -72,8 +73,10 @@ pub(super) fn make_version(
     check(connection, transaction, head.version)?;
     let live = live_rows(connection, &transaction.deltas)?;
     check_conflicts(connection, transaction, &live, head.version)?;
+    let last_fid = last_fid(connection)?;
+    check_numbers(transaction, last_fid, |fid| -> Result<_, Refused> { Ok(last_state(connection, fid)?) })?;
     let state = |fid: Fid| live.get(&fid).map(|row| row.state.clone());
-    let plan = plan(transaction, state, last_fid(connection)?, &head, (evidence, now))?;
+    let plan = plan(transaction, state, last_fid, &head, (evidence, now))?;
     VersionRow::insert(connection, &plan.record)?;
     if let Some(classes) = &transaction.classes {
         insert_classes(connection, plan.record.version, classes)?;

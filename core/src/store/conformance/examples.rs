@@ -113,6 +113,29 @@ pub fn a_number_is_never_given_twice(make: Make<'_>) {
     sound(subject.as_ref());
 }
 
+/// A change set brings numbers of its own: none that was another thing's, and none that would use up all numbers.
+pub fn a_number_stays_with_its_thing_and_near_the_others(make: Make<'_>) {
+    let subject = with_two_features(make);
+    let history = subject.history();
+    let mut update = transaction(1);
+    update.deltas = vec![Delta::remove(Fid(2), chair(100.0))];
+    assert_eq!(history.commit(&update, at(2)), Ok(VersionId(2)));
+    let under = |base, fid, state: FeatureState| UpdateTransaction {
+        deltas: vec![Delta::add(Fid(fid), state)],
+        ..transaction(base)
+    };
+    let (was, found) = ("a dynamic descriptor of class 5".to_owned(), "a material descriptor of class 3".to_owned());
+    let refused = CommitError::FidOfAnother { fid: Fid(2), was, found };
+    assert_eq!(history.commit(&under(2, 2, banner(50.0)), at(3)), Err(refused));
+    assert_eq!(history.commit(&under(2, 2, chair(70.0)), at(3)), Ok(VersionId(3)));
+    let ahead = CommitError::FidAhead { fid: Fid::MAX, last: Fid(2) };
+    assert_eq!(history.commit(&under(3, Fid::MAX.0, chair(0.0)), at(4)), Err(ahead));
+    assert_eq!(history.commit(&under(3, 1_000_000, chair(0.0)), at(4)), Ok(VersionId(4)));
+    assert_eq!(add(history, &[chair(5.0)]), Ok(VersionId(5)));
+    assert_eq!(state(history, 1_000_001), chair(5.0));
+    sound(subject.as_ref());
+}
+
 /// Objects name their geometry; a map that has it needs it no second time, and takes none under a wrong name.
 pub fn geometry_is_kept_once_under_its_digest(make: Make<'_>) {
     let subject = make(&new_map(), at(0));
