@@ -362,6 +362,7 @@ impl Run<'_> {
         let (localization, matcher) = (&outcome.located.localization, Kind::Matcher.to_string());
         Observation {
             capture: capture.digest,
+            photo: Some(capture.photo_digest()),
             taken_at: capture.taken_at,
             labels: self.recording.keep_labels.then(|| capture.label_bytes.clone()),
             prior: Some(capture.prior),

@@ -1,13 +1,19 @@
 //! `update --propose` and `--confirm`, and `proposals`.
 
 use crate::bench::{Bench, edited, street, text};
+use crate::synthetic::label_png;
 use serde_json::{Value, json};
 
-/// The street's capture with other bytes, as another phone would send it; the labels are the same.
-fn another(bench: &Bench, name: &str, taken_at: &str) -> String {
+/// The street's capture as another phone would send it: another time, and the first `pixels` pixels void.
+fn another(bench: &Bench, name: &str, (taken_at, pixels): (&str, usize)) -> String {
     let directory = bench.path(name);
     std::fs::create_dir_all(&directory).unwrap();
-    std::fs::copy(street().path("capture/labels.png"), directory.join("labels.png")).unwrap();
+    let file = std::fs::File::open(street().path("capture/labels.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+    let mut indices = vec![0; reader.output_buffer_size().unwrap()];
+    let width = reader.next_frame(&mut indices).unwrap().width;
+    indices[..pixels].fill(255);
+    std::fs::write(directory.join("labels.png"), label_png::encode(&indices, width as usize).unwrap()).unwrap();
     let capture: Value =
         serde_json::from_slice(&std::fs::read(street().path("capture/capture.json")).unwrap()).unwrap();
     let path = directory.join("capture.json");
@@ -95,7 +101,7 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
 fn what_is_on_the_map_by_now_is_not_accepted_again() {
     let bench = Bench::with_street();
     update(&bench, &capture(), &["--propose"]);
-    let other = another(&bench, "other", "2026-06-01T11:00:00+08:00");
+    let other = another(&bench, "other", ("2026-06-01T11:00:00+08:00", 1));
     assert_eq!(update(&bench, &other, &["--propose"])["proposals"], json!([2]));
     bench.json("proposals", &["accept", "2"]);
     bench.run("proposals", &["accept", "1"]).refused(21, &["is where proposal 1 puts its own", "proposals show 1"]);
@@ -112,10 +118,13 @@ fn a_change_becomes_a_version_when_enough_captures_agree() {
     // The same capture counts once, however often it is sent.
     assert_eq!(confirm(&capture())["decision"], "proposed");
     assert_eq!(confirm(&capture())["proposals"], json!([1]));
-    let second = confirm(&another(&bench, "second", "2026-06-01T11:00:00+08:00"));
-    assert_eq!((&second["decision"], &second["proposals"]), (&json!("proposed"), &json!([2])));
+    // Nor does its photo under another time, or in another file.
+    let copy = confirm(&another(&bench, "copy", ("2026-06-01T10:30:00+08:00", 0)));
+    assert_eq!((&copy["decision"], &copy["proposals"]), (&json!("proposed"), &json!([2])));
+    let second = confirm(&another(&bench, "second", ("2026-06-01T11:00:00+08:00", 1)));
+    assert_eq!((&second["decision"], &second["proposals"]), (&json!("proposed"), &json!([3])));
     assert_eq!(bench.head(), 1);
-    let third = confirm(&another(&bench, "third", "2026-06-01T12:00:00+08:00"));
+    let third = confirm(&another(&bench, "third", ("2026-06-01T12:00:00+08:00", 2)));
     assert_eq!((&third["decision"], &third["version"]), (&json!("committed"), &json!(2)));
     let banner = bench.json("query", &["--class", "banner"])["features"][0].clone();
     assert_eq!(banner["fid"], third["changes"][0]["fid"]);
