@@ -93,11 +93,13 @@ fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure
 
 fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
-    let proposal = map.proposal(id)?;
-    if proposal.status == ProposalStatus::Open {
-        refuse_what_is_there(&map, &proposal)?;
-    }
-    let version = map.accept(id, &options.by, &options.note, Timestamp::now())?;
+    let version = map.together(|map| -> Result<_, Failure> {
+        let proposal = map.proposal(id)?;
+        if proposal.status == ProposalStatus::Open {
+            refuse_what_is_there(map, &proposal)?;
+        }
+        Ok(map.accept(id, &options.by, &options.note, Timestamp::now())?)
+    })?;
     if console.is_json() {
         console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;
     } else {

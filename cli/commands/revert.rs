@@ -6,7 +6,8 @@ use crate::console::Console;
 use crate::failure::{Failure, NOTHING};
 use crate::region;
 use jiff::Timestamp;
-use resurvey_core::store::{self, History, MapFile};
+use resurvey_core::store::{self, CommitError, History, MapFile};
+use resurvey_core::update::refuse_doubles;
 use resurvey_core::version::{PluginBuild, VersionId};
 use serde_json::{Value, json};
 
@@ -24,7 +25,11 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
         (Some(build), _) => all_of(&map, build, &wish, console),
         (None, Some(revision)) => {
             wish.version = map.resolve(revision)?;
-            let version = map.revert(&wish, Timestamp::now())?;
+            let version = map.together(|map| -> Result<_, CommitError> {
+                let version = map.revert(&wish, Timestamp::now())?;
+                refuse_doubles(map, version)?;
+                Ok(version)
+            })?;
             let document = undone(&map, wish.version, version)?;
             if console.is_json() {
                 console.document(&document)?;
@@ -39,7 +44,11 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
 
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let versions = map.versions_by(build)?;
-    let done = map.revert_all(&versions, wish, Timestamp::now())?;
+    let done = map.together(|map| -> Result<_, CommitError> {
+        let done = map.revert_all(&versions, wish, Timestamp::now())?;
+        done.iter().try_for_each(|(_, version)| refuse_doubles(map, *version))?;
+        Ok(done)
+    })?;
     let documents =
         done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;
     if console.is_json() {

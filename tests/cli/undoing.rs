@@ -1,7 +1,7 @@
 //! `revert` and `tag`.
 
 use crate::bench::Bench;
-use crate::change_sets::CHAIR;
+use crate::change_sets::{CHAIR, chair, furnished};
 use crate::differences::{chair_at, changed};
 use serde_json::{Value, json};
 
@@ -41,6 +41,20 @@ fn an_undo_of_what_changed_later_is_exit_21_with_a_list() {
     let far = format!("{},{},{},{}", e + 45.0, n - 5.0, e + 55.0, n + 5.0);
     let part = bench.json("revert", &["2", "--bbox", &far]);
     assert_eq!((&part["removed"], &part["added"], &part["modified"]), (&json!(1), &json!(0), &json!(0)));
+}
+
+#[test]
+fn an_undo_does_not_put_a_chair_into_the_one_that_stands_there_by_now() {
+    let bench = furnished();
+    bench.apply(&[json!({"op": "remove", "fid": 1, "before": chair()})]);
+    bench.apply(&[json!({"op": "add", "after": chair_at(0.1)})]);
+    let run = bench.run("revert", &["2", "--json"]);
+    assert_eq!(run.code, 21, "{run:?}");
+    assert_eq!(run.json()["conflicts"], json!([{"fid": 3, "changed_in": 3, "is_on_map": true, "is_target": false}]));
+    assert_eq!(bench.head(), 3);
+    // Once that is gone, there is room.
+    bench.json("revert", &["3"]);
+    assert_eq!(bench.json("revert", &["2"])["added"], 1);
 }
 
 #[test]
