@@ -87,7 +87,9 @@ pub struct Stage {
 impl Listener for Stage {
     fn log(&self, level: Level, text: &str) {
         if level != Level::Debug {
-            let line = if level == Level::Warning { format!("warning: {text}") } else { text.to_owned() };
+            // What a plugin says is shown, and does not speak to the terminal.
+            let text = text.replace(char::is_control, " ");
+            let line = if level == Level::Warning { format!("warning: {text}") } else { text };
             self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(line);
         }
     }
