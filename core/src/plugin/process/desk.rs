@@ -89,8 +89,8 @@ impl<'a> Desk<'a> {
                         _ => 0,
                     };
                     desk.has_room(index, "proposal", bytes)?;
-                    let proposal = translate::proposal(proposal.clone());
-                    desk.rules.proposal(index, &proposal)?;
+                    let mut proposal = translate::proposal(proposal.clone());
+                    desk.rules.proposal(index, &mut proposal)?;
                     desk.collected.proposals.push(proposal);
                     Ok(())
                 })
