@@ -268,12 +268,12 @@ impl<'a> Desk<'a> {
     }
 
     fn heat(&mut self, lending: &Lending, cells: &Array) -> Result<(), Violation> {
-        match lending.memory.array::<[f64; 3]>(cells) {
+        match lending.sent::<[f64; 3]>(cells) {
             Some(cells) if cells.len() <= MOST_RESULTS - self.collected.heat.len() => {
                 self.collected.heat.extend(cells);
                 Ok(())
             }
-            _ => violation("heat", &format_args!("{cells:?}"), format!("at most {MOST_RESULTS} cells in the memory")),
+            _ => violation("heat", &format_args!("{cells:?}"), format!("at most {MOST_RESULTS} cells in the scratch")),
         }
     }
 
@@ -281,9 +281,9 @@ impl<'a> Desk<'a> {
         for region in regions {
             let index = self.collected.regions.len();
             self.has_room(index, "region", Array::packed_bytes(Dtype::U8, &region.mask.shape).unwrap_or(usize::MAX))?;
-            let Some(mask) = lending.memory.array::<u8>(&region.mask) else {
+            let Some(mask) = lending.sent::<u8>(&region.mask) else {
                 let value = format!("{:?}", region.mask);
-                return violation(format!("region[{index}].mask"), &value, "packed bytes in the memory");
+                return violation(format!("region[{index}].mask"), &value, "packed bytes in the scratch");
             };
             let [left, top, right, bottom] = region.bounds;
             let region = ChangeRegion {
@@ -302,8 +302,9 @@ impl<'a> Desk<'a> {
 
 /// The rows of an array of a request.
 fn read<T: Plain>(lending: &Lending, array: &Array) -> Result<Vec<T>, ServiceError> {
-    let values = lending.memory.array(array);
-    values.ok_or_else(|| ServiceError(format!("expected packed rows of {:?} in the memory, found {array:?}", T::DTYPE)))
+    let values = lending.sent(array);
+    values
+        .ok_or_else(|| ServiceError(format!("expected packed rows of {:?} in the scratch, found {array:?}", T::DTYPE)))
 }
 
 fn points(lending: &Lending, array: &Array) -> Result<Vec<GridPoint>, ServiceError> {

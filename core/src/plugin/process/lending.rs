@@ -6,6 +6,7 @@ use crate::plugin::input::ViewImages;
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{Array, Dtype, MEMORY_HEADER, Scratch, WireViews};
 use std::io;
+use std::ops::Range;
 
 /// Least bytes that a plugin may write to in a call.
 const SCRATCH_BYTES: usize = 1 << 20;
@@ -16,16 +17,18 @@ pub(super) struct Lending {
     pub(super) memory: SharedMemory,
     /// The first byte that is not lent.
     next: usize,
+    /// What the plugin may write to in this call.
+    scratch: Range<usize>,
 }
 
 impl Lending {
     pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { memory: SharedMemory::new()?, next: MEMORY_HEADER })
+        Ok(Self { memory: SharedMemory::new()?, next: MEMORY_HEADER, scratch: 0..0 })
     }
 
     /// Takes everything back.
     pub(super) fn start(&mut self) {
-        self.next = MEMORY_HEADER;
+        (self.next, self.scratch) = (MEMORY_HEADER, 0..0);
         self.memory.set_cancelled(false);
     }
 
@@ -65,7 +68,15 @@ impl Lending {
     pub(super) fn scratch(&mut self, pixels: usize) -> io::Result<Scratch> {
         let bytes = SCRATCH_BYTES.max(aligned(pixels));
         let array = self.reserve(Dtype::U8, &[bytes])?;
+        self.scratch = array.offset..array.offset + bytes;
         Ok(Scratch { offset: array.offset, bytes })
+    }
+
+    /// A copy of an array that the plugin has sent; `None` when it is none of these values, or lies outside the scratch.
+    pub(super) fn sent<T: Plain>(&self, array: &Array) -> Option<Vec<T>> {
+        let bytes = Array::packed_bytes(array.dtype, &array.shape)?;
+        let is_inside = array.offset >= self.scratch.start && array.offset.checked_add(bytes)? <= self.scratch.end;
+        if is_inside || bytes == 0 { self.memory.array(array) } else { None }
     }
 
     /// Places for `count` views of one size, with the table that their features index.
@@ -111,4 +122,27 @@ pub(super) fn view_bytes((width, height): (u32, u32)) -> usize {
     // Label, range, point and feature of a pixel.
     const PIXEL_BYTES: usize = 1 + 4 + 12 + 4;
     (width as usize * height as usize).saturating_mul(PIXEL_BYTES).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_plugin_sends_lies_in_the_scratch_or_is_not_taken() {
+        let mut lending = Lending::new().unwrap();
+        let photo = lending.lend(&[8], &[7_u8; 8]).unwrap();
+        let scratch = lending.scratch(0).unwrap();
+        let array = |offset, length| Array::packed(Dtype::U8, &[length], offset);
+        assert_eq!(lending.sent::<u8>(&array(scratch.offset, 3)), Some(vec![0; 3]));
+        let end = scratch.offset + scratch.bytes;
+        assert_eq!(lending.sent::<u8>(&array(end - 2, 2)), Some(vec![0; 2]));
+        for wrong in [photo, array(end - 2, 3), array(end, usize::MAX), array(scratch.offset - 64, 65)] {
+            assert_eq!(lending.sent::<u8>(&wrong), None, "{wrong:?}");
+        }
+        // Nothing lies nowhere.
+        assert_eq!(lending.sent::<u8>(&array(0, 0)), Some(Vec::new()));
+        lending.start();
+        assert_eq!(lending.sent::<u8>(&array(scratch.offset, 3)), None);
+    }
 }
