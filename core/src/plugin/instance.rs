@@ -78,7 +78,8 @@ impl Instance {
         }
         let mut error = self.error.lend();
         let status = body(&self.table, self.pointer, &raw mut error);
-        if status == STATUS_OK {
+        let cancelled = cancelled();
+        if status == STATUS_OK && !cancelled {
             return Ok(());
         }
         self.check(call, status, &error, cancelled())
@@ -93,12 +94,13 @@ impl Instance {
     ) -> Result<(), PluginError> {
         let (plugin, text) = (self.name(), self.error.text(error));
         match status {
-            STATUS_OK => Ok(()),
             STATUS_PANICKED => {
                 self.poisoned = true;
                 Err(PluginError::Panicked { plugin, call, text })
             }
+            // What is done after a cancel may be done by half.
             _ if cancelled || status == STATUS_CANCELLED => Err(PluginError::Cancelled { plugin, call }),
+            STATUS_OK => Ok(()),
             _ => Err(PluginError::Failed { plugin, call, text }),
         }
     }

@@ -87,23 +87,27 @@ impl Matcher {
         match &mut self.0 {
             // SAFETY: photo and view are borrowed for longer than the call.
             Body::Here(instance) => unsafe { line::score(instance, &lend::image(photo), &lend::view(view)) },
-            Body::Apart(instance) => Ok(instance.scores(photo, 1, &mut |_, take| take(view))?[0]),
+            Body::Apart(instance) => Ok(instance.scores(photo, 1, &mut |_, take| take(view), &|| false)?[0]),
         }
     }
 
     /// Similarity of photo and `count` views, in order. `view` hands view `index` to its second argument; a plugin in
-    /// another process scores one batch of them while the next is made.
+    /// another process scores one batch of them while the next is made. Once `cancelled` says so, it ends with an error.
     pub fn score_each(
         &mut self,
         photo: &LabelImage,
         count: usize,
         view: &mut MakeView<'_>,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<f64>, PluginError> {
         if let Body::Apart(instance) = &mut self.0 {
-            return instance.scores(photo, count, view);
+            return instance.scores(photo, count, view, cancelled);
         }
         let mut scores = Vec::with_capacity(count);
         for index in 0..count {
+            if cancelled() {
+                return Err(PluginError::Cancelled { plugin: self.info().name.clone(), call: "score" });
+            }
             let mut score = Ok(f64::NAN);
             view(index, &mut |view| score = self.score(photo, view));
             scores.push(score?);

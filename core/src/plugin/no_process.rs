@@ -76,7 +76,13 @@ impl Apart {
         match *self {}
     }
 
-    pub(super) fn scores(&mut self, _: &LabelImage, _: usize, _: &mut MakeView<'_>) -> Result<Vec<f64>, PluginError> {
+    pub(super) fn scores(
+        &mut self,
+        _: &LabelImage,
+        _: usize,
+        _: &mut MakeView<'_>,
+        _: &dyn Fn() -> bool,
+    ) -> Result<Vec<f64>, PluginError> {
         match *self {}
     }
 

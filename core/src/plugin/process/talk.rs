@@ -82,6 +82,9 @@ impl Talk {
         self.follow(call.memory)?;
         let count = *call.scores.shape.first().unwrap_or(&0);
         for index in 0..count {
+            if self.cancelled() {
+                return Ok(ToHost::Cancelled {});
+            }
             let (photo, view) = {
                 let memory = &self.lock().memory;
                 (image(memory, &call.photo, None)?, view(memory, &call.views, index)?)
