@@ -397,7 +397,8 @@ typedef struct rsv_table {
    * "integer" | "boolean" | "string", "default": ..., "minimum", "maximum", "enum", "description"}, ...}}. Empty: no
    * settings. Lives as long as the library. */
   rsv_text settings_schema;
-  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. */
+  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. With
+   * anything but RSV_OK there is no instance: the host does not call destroy, whatever *instance is. */
   rsv_status (*create)(rsv_text settings, rsv_instance **instance, rsv_error *error);
   /* Once per instance; also after RSV_PANICKED. */
   void (*destroy)(rsv_instance *instance);

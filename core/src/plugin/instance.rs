@@ -54,6 +54,10 @@ impl Instance {
         let text = Text::of(settings.as_json());
         // SAFETY: the function came from the plugin's own entry; text, place and buffer live until it returns.
         let status = unsafe { create(text, &raw mut instance.pointer, &raw mut error) };
+        if status != STATUS_OK {
+            // Whatever a plugin has left there, it has made no instance that is to be ended.
+            instance.pointer = null_mut();
+        }
         instance.check("create", status, &error, false)?;
         Ok(instance)
     }
@@ -82,7 +86,7 @@ impl Instance {
         if status == STATUS_OK && !cancelled {
             return Ok(());
         }
-        self.check(call, status, &error, cancelled())
+        self.check(call, status, &error, cancelled)
     }
 
     fn check(
