@@ -31,7 +31,10 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
     }
     let mut registry = Registry::new(allowed);
     if !search.in_process {
-        registry.isolate(isolation(search, data.as_deref()));
+        registry.isolate(isolation(search));
+    }
+    if let Some(data) = &data {
+        registry.count_crashes(CrashLog::new(&data.join(CRASHED)));
     }
     for declaration in [
         resurvey_semantic::plugin(),
@@ -59,12 +62,11 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
 }
 
 /// How plugins from files are kept apart.
-fn isolation(search: &PluginSearch, data: Option<&Path>) -> Isolation {
+fn isolation(search: &PluginSearch) -> Isolation {
     Isolation {
         program: search.program.clone(),
         call_limit: Duration::from_secs_f64(search.plugin_timeout),
         memory_mib: search.plugin_memory,
-        crashes: data.map(|data| CrashLog::new(&data.join(CRASHED))),
     }
 }
 

@@ -1,6 +1,7 @@
 //! A plugin whose code may run: opened once, never closed.
 #![allow(unsafe_code)]
 
+use super::crashes::CrashLog;
 use super::declaration::{Declared, Fault, header_bytes, read_builtin};
 use super::error::{PluginError, Refusal, Stage};
 use super::info::{Digest, Kind, PluginInfo};
@@ -78,9 +79,9 @@ impl Plugin {
         (path, fingerprint): (&Path, Fingerprint),
         declared: Declared,
         sha256: Digest,
-        isolation: Arc<Isolation>,
+        keeping: (Arc<Isolation>, Option<CrashLog>),
     ) -> Result<Self, PluginError> {
-        let (program, schema) = Program::load((path, fingerprint), declared.clone(), sha256, isolation)?;
+        let (program, schema) = Program::load((path, fingerprint), declared.clone(), sha256, keeping)?;
         let text = program.settings_schema().to_owned();
         Ok(Self::new(declared, sha256, Some(path), Code::Apart(Arc::new(program)), text, schema))
     }

@@ -1,5 +1,6 @@
 //! Which plugins there are: those built in, and those found in directories. Listing runs no code of a file.
 
+use super::crashes::CrashLog;
 use super::declaration::{Declared, Fault, read_library};
 use super::error::{PluginError, Refusal, Stage};
 use super::executable::{is_named_executable, read_executable};
@@ -26,6 +27,7 @@ pub struct Registry {
     directories: Vec<PathBuf>,
     allowed: HashSet<Digest>,
     isolation: Option<Arc<Isolation>>,
+    crashes: Option<CrashLog>,
 }
 
 /// A file that will not be loaded.
@@ -48,6 +50,11 @@ impl Registry {
     /// Runs plugins from files in processes of their own. Without it libraries are opened in this process.
     pub fn isolate(&mut self, isolation: Isolation) {
         self.isolation = Some(Arc::new(isolation));
+    }
+
+    /// Counts crashes in `log`, and refuses files that crashed too often, however they are run.
+    pub fn count_crashes(&mut self, log: CrashLog) {
+        self.crashes = Some(log);
     }
 
     /// Adds a plugin that is linked into this program.
@@ -89,8 +96,7 @@ impl Registry {
             Err(fault) => return self.skip(path, name, fault),
         };
         let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
-        let quarantine = self.isolation.as_ref().and_then(|isolation| isolation.crashes.as_ref());
-        if let Some(Err(fault)) = quarantine.map(|log| log.check(info.sha256)) {
+        if let Err(fault) = self.check_crashes(info.sha256) {
             return self.skip(path, name, fault);
         }
         let first = match (self.builtins.contains_key(&info.name), self.found.get(&info.name)) {
@@ -105,6 +111,19 @@ impl Registry {
         };
         let reason = format!("a plugin called {} is already there, {first}", info.name);
         self.skip(path, None, (Stage::File, reason, "remove one of the two".to_owned()));
+    }
+
+    /// Takes the file at `path` for the plugin of its name, whatever other file was found for it.
+    pub fn prefer(&mut self, path: &Path) -> Result<(), PluginError> {
+        let candidate = examine(path, &self.allowed).1.map_err(|fault| refusal(path, fault))?;
+        let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
+        self.check_crashes(info.sha256).map_err(|fault| refusal(path, fault))?;
+        self.found.insert(info.name.clone(), info);
+        Ok(())
+    }
+
+    fn check_crashes(&self, sha256: Digest) -> Result<(), Fault> {
+        self.crashes.as_ref().map_or(Ok(()), |log| log.check(sha256))
     }
 
     fn skip(&mut self, path: &Path, name: Option<String>, fault: Fault) {
@@ -168,8 +187,12 @@ impl Registry {
         let refused = |fault| PluginError::from(refusal(path, fault));
         let fingerprint = fingerprint(path).map_err(refused)?;
         let Candidate { path: real, sha256, declared } = examine(path, &self.allowed).1.map_err(refused)?;
+        self.check_crashes(sha256).map_err(refused)?;
         match &self.isolation {
-            Some(isolation) => Plugin::apart((&real, fingerprint), declared, sha256, Arc::clone(isolation)),
+            Some(isolation) => {
+                let keeping = (Arc::clone(isolation), self.crashes.clone());
+                Plugin::apart((&real, fingerprint), declared, sha256, keeping)
+            }
             None if declared.is_executable() => {
                 let advice = "leave out --in-process".to_owned();
                 Err(refused((Stage::Symbol, "an executable runs in a process of its own alone".to_owned(), advice)))

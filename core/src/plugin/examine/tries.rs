@@ -64,7 +64,7 @@ impl Bench<'_> {
         if declared.is_executable() {
             self.report.step("at its start");
             let place = (self.path, registry::fingerprint(self.path).map_err(refused)?);
-            return Ok(Plugin::apart(place, declared, sha256, Arc::clone(&self.isolation))?);
+            return Ok(Plugin::apart(place, declared, sha256, (Arc::clone(&self.isolation), None))?);
         }
         self.report.step("in the library's own start or in entry");
         let plugin = Plugin::open(self.path, declared, sha256).map_err(refused)?;
