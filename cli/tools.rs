@@ -67,6 +67,7 @@ fn isolation(search: &PluginSearch) -> Isolation {
         program: search.program.clone(),
         call_limit: Duration::from_secs_f64(search.plugin_timeout),
         memory_mib: search.plugin_memory,
+        forgets: false,
     }
 }
 

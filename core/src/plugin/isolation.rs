@@ -13,6 +13,9 @@ pub struct Isolation {
     pub call_limit: Duration,
     /// Address space, MiB, as far as the system allows it; 0 is no limit.
     pub memory_mib: u64,
+    /// Whether what was lent is overwritten after each call, and lent elsewhere in the next: for tests, which find a plugin
+    /// that keeps it.
+    pub forgets: bool,
 }
 
 impl Isolation {
@@ -28,6 +31,7 @@ impl Default for Isolation {
             program: None,
             call_limit: Duration::from_secs_f64(Self::DEFAULT_CALL_LIMIT_S),
             memory_mib: Self::DEFAULT_MEMORY_MIB,
+            forgets: false,
         }
     }
 }

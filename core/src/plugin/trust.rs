@@ -89,7 +89,8 @@ pub(super) fn check_allowed(path: &Path, sha256: Digest, allowed: &HashSet<Diges
     Err((Stage::AllowList, format!("SHA-256 {sha256} is not on the list of allowed plugins"), advice))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::os::unix::fs::{PermissionsExt, chown};

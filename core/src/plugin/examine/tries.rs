@@ -287,7 +287,8 @@ pub(super) fn repeats(bench: &Bench<'_>) -> Tried {
             if let Some(difference) = first.difference(&again) {
                 return Err(Finding::failed(
                     format!("{which} gave another answer to the same input: {difference}"),
-                    "use no clock, no random seed, no address and no order of threads; clear what a call leaves behind",
+                    "use no clock, no random seed, no address and no order of threads; clear what a call leaves behind, and copy \
+                     what you keep: an array that was lent has other values after the call",
                 ));
             }
         }

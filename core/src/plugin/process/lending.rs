@@ -10,25 +10,41 @@ use std::ops::Range;
 
 /// Least bytes that a plugin may write to in a call.
 const SCRATCH_BYTES: usize = 1 << 20;
+/// What stands where something was lent.
+const FORGOTTEN: u8 = 0xA5;
+/// Bytes that are lent one after the other before it is begun anew.
+const MOST_FORGOTTEN: usize = 64 << 20;
 
 /// The host's side of the memory.
 #[derive(Debug)]
 pub(super) struct Lending {
     pub(super) memory: SharedMemory,
+    /// The first byte that is lent in this call.
+    first: usize,
     /// The first byte that is not lent.
     next: usize,
+    /// The first byte that was not lent in this call.
+    end: usize,
+    /// Whether nothing of a call is there in the next.
+    forgets: bool,
     /// What the plugin may write to in this call.
     scratch: Range<usize>,
 }
 
 impl Lending {
-    pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { memory: SharedMemory::new()?, next: MEMORY_HEADER, scratch: 0..0 })
+    /// Nothing lent yet; with `forgets` a plugin that keeps what it was lent finds other things there.
+    pub(super) fn new(forgets: bool) -> io::Result<Self> {
+        let (memory, first) = (SharedMemory::new()?, MEMORY_HEADER);
+        Ok(Self { memory, first, next: first, end: first, forgets, scratch: 0..0 })
     }
 
     /// Takes everything back.
     pub(super) fn start(&mut self) {
-        (self.next, self.scratch) = (MEMORY_HEADER, 0..0);
+        if self.forgets {
+            self.memory.write(self.first, &vec![FORGOTTEN; self.end - self.first]);
+            self.first = if self.end < MOST_FORGOTTEN { aligned(self.end) } else { MEMORY_HEADER };
+        }
+        (self.next, self.end, self.scratch) = (self.first, self.first, 0..0);
         self.memory.set_cancelled(false);
     }
 
@@ -48,7 +64,7 @@ impl Lending {
         let end = Array::packed_bytes(dtype, shape).and_then(|bytes| offset.checked_add(bytes));
         let end = end.ok_or_else(|| io::Error::other("an array is larger than memory can be"))?;
         self.memory.grow(end)?;
-        self.next = end;
+        (self.next, self.end) = (end, self.end.max(end));
         Ok(Array::packed(dtype, shape, offset))
     }
 
@@ -129,8 +145,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_to_be_forgotten_is_overwritten_and_lent_elsewhere() {
+        let mut lending = Lending::new(true).unwrap();
+        let first = lending.lend(&[4], &[7_u8; 4]).unwrap();
+        lending.start();
+        let second = lending.lend(&[4], &[8_u8; 4]).unwrap();
+        assert_ne!(first.offset, second.offset);
+        let at = |array: &Array| lending.memory.array::<u8>(array).unwrap();
+        assert_eq!((at(&first), at(&second)), (vec![FORGOTTEN; 4], vec![8; 4]));
+    }
+
+    #[test]
     fn what_a_plugin_sends_lies_in_the_scratch_or_is_not_taken() {
-        let mut lending = Lending::new().unwrap();
+        let mut lending = Lending::new(false).unwrap();
         let photo = lending.lend(&[8], &[7_u8; 8]).unwrap();
         let scratch = lending.scratch(0).unwrap();
         let array = |offset, length| Array::packed(Dtype::U8, &[length], offset);

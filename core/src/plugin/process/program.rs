@@ -128,7 +128,7 @@ impl Program {
 
     fn open(&self) -> io::Result<Link> {
         let (ours, theirs) = UnixStream::pair()?;
-        let lending = Lending::new()?;
+        let lending = Lending::new(self.isolation.forgets)?;
         let mode = if self.declared.is_executable() { "executable" } else { "library" };
         let (memory, parent) = (self.isolation.memory_mib.to_string(), std::process::id().to_string());
         let words = [mode, &memory, &parent, self.fingerprint.as_str()].map(OsString::from);
