@@ -191,7 +191,7 @@ fn describe(status: ExitStatus) -> String {
 
 fn signal_name(signal: i32) -> &'static str {
     match Signal::from_named_raw(signal) {
-        Some(Signal::ABORT) => " (SIGABRT: it aborted)",
+        Some(Signal::ABORT) => " (SIGABRT: it aborted; where memory was short, --plugin-memory MIB gives it more)",
         Some(Signal::SEGV) => " (SIGSEGV: it used memory that is not its own)",
         Some(Signal::BUS) => " (SIGBUS)",
         Some(Signal::FPE) => " (SIGFPE)",

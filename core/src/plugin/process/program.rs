@@ -110,7 +110,8 @@ impl Program {
     fn start(&self) -> Result<(Link, Hello), PluginError> {
         self.refuse_quarantined()?;
         let mut link = self.open().map_err(|error| {
-            let text = format!("its process could not be started: {error}");
+            let next = "free memory and processes, or raise their limits";
+            let text = format!("its process could not be started: {error}; {next}");
             PluginError::InvalidInput { plugin: self.declared.name.clone(), text }
         })?;
         let mut turn = Turn::steady("load");
