@@ -27,6 +27,7 @@ const SAME_POSE: (f64, f64) = (0.001, 0.001);
 
 /// Runs the plugins of a version again on what it saw, and compares.
 pub fn run(options: &Replay, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    console.listen();
     let map = MapFile::open_read_only(&options.map)?;
     let version = map.resolve(&options.revision)?;
     let recorded = evidence(&map, version)?;
