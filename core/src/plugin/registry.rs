@@ -28,6 +28,7 @@ pub struct Registry {
     allowed: HashSet<Digest>,
     isolation: Option<Arc<Isolation>>,
     crashes: Option<CrashLog>,
+    program: Option<Digest>,
 }
 
 /// A file that will not be loaded.
@@ -57,9 +58,14 @@ impl Registry {
         self.crashes = Some(log);
     }
 
+    /// Makes the digest of every plugin that is added to this program depend on the program's own.
+    pub fn of_program(&mut self, sha256: Digest) {
+        self.program = Some(sha256);
+    }
+
     /// Adds a plugin that is linked into this program.
     pub fn add_builtin(&mut self, declaration: &'static Declaration) -> Result<(), PluginError> {
-        let plugin = Plugin::builtin(declaration)?;
+        let plugin = Plugin::of_program(declaration, self.program)?;
         let name = plugin.info().name.clone();
         if self.builtins.contains_key(&name) {
             let reason = "another built-in plugin has this name".to_owned();
@@ -163,18 +169,18 @@ impl Registry {
         Err(PluginError::Unknown { name: name.to_owned(), known })
     }
 
-    /// Whether the file at `path` is a program that speaks the wire, and no library; runs none of its code.
-    pub fn is_executable(path: &Path) -> bool {
-        read(path).and_then(|(path, bytes)| read_declaration(&path, &bytes)).is_ok_and(|found| found.is_executable())
+    /// What the file at `path` says of itself, whether or not it may be loaded; runs no code of it.
+    pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
+        let (real, bytes) = read(path).map_err(|fault| refusal(path, fault))?;
+        Self::inspect_bytes(&real, &bytes).map(|(info, _)| info)
     }
 
-    /// What the library at `path` says of itself, whether or not it may be loaded; runs no code of it.
-    pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
-        let found = read(path).and_then(|(path, bytes)| {
-            let declared = read_declaration(&path, &bytes)?;
-            Ok(Candidate { path, sha256: Digest::of(&bytes), declared }.info())
-        });
-        found.map_err(|fault| refusal(path, fault).into())
+    /// What `bytes`, read from `path`, say of themselves, and whether they are a program that speaks the wire.
+    pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<(PluginInfo, bool), PluginError> {
+        let declared = read_declaration(path, bytes).map_err(|fault| refusal(path, fault))?;
+        let is_executable = declared.is_executable();
+        let candidate = Candidate { path: path.to_owned(), sha256: Digest::of(bytes), declared };
+        Ok((candidate.info(), is_executable))
     }
 
     /// Refuses a file or directory that others may write, or replace.
