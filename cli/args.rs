@@ -416,6 +416,9 @@ pub struct Replay {
     /// Also with other builds of the plugins than the recorded ones
     #[arg(long)]
     pub any_build: bool,
+    /// Where a file that a setting names lies now, e.g. segnet.weights=models/city.onnx; may be given again
+    #[arg(long, value_name = "PLUGIN.KEY=PATH")]
+    pub file: Vec<String>,
 }
 
 /// Arguments of `apply`.

@@ -1,6 +1,7 @@
 //! Where results and messages go: results to standard output, everything else to standard error.
 
 use crate::failure::Failure;
+use crate::interrupt::Interrupt;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use resurvey_core::localize::Listener;
 use resurvey_schema::service::Level;
@@ -15,12 +16,28 @@ pub struct Console<'a> {
     err: &'a mut dyn Write,
     is_json: bool,
     shows_progress: bool,
+    interrupt: Interrupt,
 }
 
 impl<'a> Console<'a> {
     /// A console; `is_json` is the `--json` option.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, is_json: bool, shows_progress: bool) -> Self {
-        Self { out, err, is_json, shows_progress }
+        Self { out, err, is_json, shows_progress, interrupt: Interrupt::default() }
+    }
+
+    /// Lets `interrupt` end what [`listens`](Self::listen).
+    pub fn interrupted_by(self, interrupt: Interrupt) -> Self {
+        Self { interrupt, ..self }
+    }
+
+    /// From now on the command ends by itself where the user asks for it, and not in the middle of something.
+    pub fn listen(&self) {
+        self.interrupt.listen();
+    }
+
+    /// An error where the user has asked to end.
+    pub fn go_on(&self) -> Result<(), Failure> {
+        if self.interrupt.is_asked() { Err(Failure::interrupted("before the next step")) } else { Ok(()) }
     }
 
     /// Whether results are JSON.
@@ -58,7 +75,7 @@ impl<'a> Console<'a> {
         if self.shows_progress {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Stage { bar, lines: Mutex::default(), start: Instant::now() }
+        Stage { bar, lines: Mutex::default(), start: Instant::now(), interrupt: self.interrupt.clone() }
     }
 
     /// Ends `stage`, prints what plugins said in it, and returns its duration in milliseconds.
@@ -82,12 +99,15 @@ pub struct Stage {
     bar: ProgressBar,
     lines: Mutex<Vec<String>>,
     start: Instant,
+    interrupt: Interrupt,
 }
 
 impl Listener for Stage {
     fn log(&self, level: Level, text: &str) {
         if level != Level::Debug {
-            let line = if level == Level::Warning { format!("warning: {text}") } else { text.to_owned() };
+            // What a plugin says is shown, and does not speak to the terminal.
+            let text = text.replace(char::is_control, " ");
+            let line = if level == Level::Warning { format!("warning: {text}") } else { text };
             self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(line);
         }
     }
@@ -97,6 +117,6 @@ impl Listener for Stage {
     }
 
     fn cancelled(&self) -> bool {
-        false
+        self.interrupt.is_asked()
     }
 }

@@ -1,4 +1,5 @@
-//! Errors with their exit code: 2 usage, 10 input or output file, 11 no such thing, 12 plugin, 13 map file, 21 conflict.
+//! Errors with their exit code: 2 usage, 10 input or output file, 11 no such thing, 12 plugin, 13 map file, 21 conflict,
+//! 130 interrupted.
 
 use resurvey_core::capture::CaptureError;
 use resurvey_core::crs::CrsError;
@@ -33,6 +34,8 @@ pub const NOTHING: u8 = 20;
 pub const CONFLICT: u8 = 21;
 /// Not an error: the pose is not reliable.
 pub const UNRELIABLE: u8 = 22;
+/// The user asked to end: 128 and the number of the signal, as shells say it.
+pub const INTERRUPTED: u8 = 130;
 
 /// Why a command ended, and with which code.
 #[derive(Debug)]
@@ -57,6 +60,11 @@ impl Failure {
     /// A wrong input file, in words.
     pub fn input(text: impl fmt::Display) -> Self {
         Self::new(INPUT, anyhow::anyhow!("{text}"))
+    }
+
+    /// The user asked to end, and so it did in the step that `reason` tells.
+    pub fn interrupted(reason: impl fmt::Display) -> Self {
+        Self::new(INTERRUPTED, anyhow::anyhow!("interrupted, {reason}; what was not finished is not in the map"))
     }
 
     /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.

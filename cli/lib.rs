@@ -6,6 +6,7 @@ mod commands;
 mod console;
 mod document;
 mod failure;
+mod interrupt;
 mod matching;
 mod prior;
 mod region;
@@ -20,7 +21,8 @@ use commands::{
     query, render, replay, revert, tag, update,
 };
 use console::Console;
-use failure::{Failure, USAGE};
+use failure::{Failure, INTERRUPTED, USAGE};
+pub use interrupt::Interrupt;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -41,6 +43,8 @@ pub struct Host {
     pub shows_progress: bool,
     /// The `resurvey` program, which runs plugins from files in processes of their own; without it they are refused.
     pub program: Option<PathBuf>,
+    /// How the user ends a run before it has ended.
+    pub interrupt: Interrupt,
 }
 
 /// The same, for a program that says more of itself.
@@ -54,8 +58,13 @@ where
         Err(error) => return explain(&error, out, err),
     };
     cli.plugins.program = host.program;
-    let mut console = Console::new(out, err, cli.json, host.shows_progress);
+    let interrupt = host.interrupt;
+    let mut console = Console::new(out, err, cli.json, host.shows_progress).interrupted_by(interrupt.clone());
     let result = dispatch(&cli, &mut console)
+        .map_err(|failure| match failure.code() {
+            code if interrupt.is_asked() && code != INTERRUPTED => Failure::interrupted(failure),
+            _ => failure,
+        })
         .or_else(|failure| tell(failure, &mut console))
         .and_then(|code| Ok(console.out().flush().map(|()| code)?));
     exit_code(result, err)

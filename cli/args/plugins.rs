@@ -25,8 +25,8 @@ pub enum Plugins {
     Check(Check),
     /// Copy a plugin file to the user's data directory and allow it
     ///
-    /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; an older build of
-    /// the same name is taken away.
+    /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; older builds of the
+    /// same name stay for replay and run no more.
     Install(Install),
     /// Write a project for a plugin of your own, which builds and passes "plugins check"
     ///

@@ -18,6 +18,7 @@ use std::path::Path;
 
 /// Finds the pose of a capture. Exit code 0 when it is reliable, 22 when it is not.
 pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    console.listen();
     let registry = registry(plugins)?;
     let names: Vec<&str> = options.labels.segmenter.as_deref().into_iter().chain([options.matcher.as_str()]).collect();
     let mut choices = Choices::read(&options.settings, &names)?;

@@ -32,6 +32,7 @@ use std::path::Path;
 /// last one that did not.
 pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     refuse_one_for_several(options)?;
+    console.listen();
     let mut tools = Tools::load(options, plugins)?;
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
     let given = options.pose.as_deref().map(read_given_pose).transpose()?;
@@ -191,6 +192,7 @@ impl Run<'_> {
         reports: Option<&mut Reports>,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
+        console.go_on()?;
         if let Some(document) = repeated(self.map, self.recording.idempotency_key, path)? {
             if !console.is_json() {
                 console.line(format_args!("{}: committed before, version {}", path.display(), document["version"]))?;
@@ -254,6 +256,7 @@ impl Run<'_> {
             comparers.detector.finish()?;
             comparers.estimator.finish()?;
         }
+        console.go_on()?;
         let stage = console.stage("commit");
         let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));

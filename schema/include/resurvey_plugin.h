@@ -1,4 +1,4 @@
-/* resurvey plugin line, version 1.0.
+/* resurvey plugin line, version 1.1.
  *
  * A plugin is a shared library with ONE exported data symbol, an rsv_declaration. The host reads its first bytes from
  * the file before any code of the plugin runs, opens the library, calls `entry` once, and then the functions that entry
@@ -37,7 +37,7 @@ extern "C" {
 #endif
 
 #define RSV_ABI_MAJOR 1
-#define RSV_ABI_MINOR 0
+#define RSV_ABI_MINOR 1 /* 1: segmenters */
 
 /* Every function of the line uses the C calling convention of the platform. */
 #ifdef _WIN32
@@ -397,7 +397,8 @@ typedef struct rsv_table {
    * "integer" | "boolean" | "string", "default": ..., "minimum", "maximum", "enum", "description"}, ...}}. Empty: no
    * settings. Lives as long as the library. */
   rsv_text settings_schema;
-  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. */
+  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. With
+   * anything but RSV_OK there is no instance: the host does not call destroy, whatever *instance is. */
   rsv_status (*create)(rsv_text settings, rsv_instance **instance, rsv_error *error);
   /* Once per instance; also after RSV_PANICKED. */
   void (*destroy)(rsv_instance *instance);
@@ -445,8 +446,8 @@ typedef struct rsv_declaration {
 
 #define RSV_HEADER(kind_)                                                                                              \
   {                                                                                                                    \
-    {'R', 'E', 'S', 'U', 'R', 'V', 'E', 'Y'}, RSV_ABI_MAJOR, RSV_ABI_MINOR, sizeof(rsv_declaration), 0, (kind_), 0,    \
-    { 0 }                                                                                                              \
+    {'R', 'E', 'S', 'U', 'R', 'V', 'E', 'Y'}, RSV_ABI_MAJOR, RSV_ABI_MINOR, sizeof(rsv_declaration),                   \
+    (kind_) == RSV_KIND_SEGMENTER, (kind_), 0, { 0 }                                                                   \
   }
 
 /* Whether the struct behind a pointer reaches as far as a field: that of an older host may end before it.

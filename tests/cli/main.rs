@@ -20,6 +20,7 @@ mod map_files;
 mod matchers;
 mod models;
 mod page;
+mod plugin_builds;
 mod plugin_check;
 mod plugin_faults;
 mod plugin_files;

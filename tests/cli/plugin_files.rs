@@ -97,6 +97,8 @@ fn a_plugin_that_fails_or_lies_stops_the_update() {
     for (flag, words) in [
         ("-DENTRY_FAILS", &["needs a licence"][..]),
         ("-DCREATE_FAILS", &["plugin broken", "no model for this city"]),
+        // It leaves what it has freed where the instance would be.
+        ("-DCREATE_LEAVES", &["plugin broken gave no answer in create: no model for this city"]),
         ("-DSCORE=NAN", &["plugin broken", "NaN", "from 0 to 1"]),
         ("-DNO_REASON", &["plugin broken", "no reason given"]),
     ] {
