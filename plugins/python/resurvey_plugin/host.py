@@ -7,6 +7,7 @@ from .plugin import Cancelled, Failed
 from .records import Pose, View
 
 _ANSWER_BYTES = 64 << 20
+_LOG_BYTES = 16 << 10
 _LEVELS = ("warning", "info", "debug")
 
 
@@ -23,15 +24,17 @@ class Host:
         """One more than the highest class index."""
 
     def render(self, poses, stride=1, with_descriptors=True):
-        """One `View` per pose, with every `stride`-th pixel of the camera of the call."""
+        """A list with one `View` per pose, with every `stride`-th pixel of the camera of the call. All are kept: ask for as
+        many at a time as there is memory for."""
         poses = _rows(poses, 6)
-        done = 0
-        while done < len(poses):
-            wanted = poses[done:done + max(1, self._scratch["bytes"] // 48)]
+        found = []
+        while len(found) < len(poses):
+            wanted = poses[len(found):len(found) + max(1, self._scratch["bytes"] // 48)]
             answer = self._ask("render", stride=int(stride), with_descriptors=bool(with_descriptors),
                                poses=self._sent(wanted))
-            yield from (_copied(view) for view in views(self._link, answer["views"]))
-            done += answer["views"]["labels"]["shape"][0]
+            # The next request takes the memory back.
+            found += [_copied(view) for view in views(self._link, answer["views"])]
+        return found
 
     def compare_views(self, poses, stride=1, ignored_in_photo=(), ignored_in_view=(), boundary_tolerance_px=0.0):
         """`uint32` [poses, classes, 7]: pixels of every class in photo and view, in the order of `CLASS_COUNTS`."""
@@ -86,10 +89,10 @@ class Host:
         return np.array(self._ask("wgs84_from_grid", point=words.numbers(point, 3))["position"])
 
     def log(self, text, level="info"):
-        """A line for the host's log; `level` is warning, info or debug."""
+        """A line for the host's log, cut after 16 KiB; `level` is warning, info or debug."""
         if level not in _LEVELS:
             raise ValueError(f"expected a level of {', '.join(_LEVELS)}, found {level!r}")
-        self._link.send("log", {"level": level, "text": str(text)})
+        self._link.send("log", {"level": level, "text": words.text(text, _LOG_BYTES)})
 
     def progress(self, fraction):
         """Tells the user how far the call is, 0 to 1."""

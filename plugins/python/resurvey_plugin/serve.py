@@ -15,7 +15,7 @@ from .plugin import Cancelled, Failed, Settings, hello
 from .records import Comparison, Localization, Photo, Region
 
 _REGIONS_IN_A_MESSAGE = 500
-_TEXT = 10_000
+_TEXT_BYTES = 10_000
 _OWN = os.path.dirname(os.path.abspath(__file__))
 
 
@@ -60,7 +60,7 @@ def _answer(link, plugin, instance, call, value):
         if link.cancelled():
             link.send("cancelled", {})
         else:
-            link.send("failed", {"text": str(failure)[:_TEXT]})
+            link.send("failed", {"text": words.text(failure, _TEXT_BYTES)})
     except BaseException as error:  # A SystemExit of the author is a bug as well, and is told as one.
         traceback.print_exc()
         link.send("panicked", {"text": _told(error)})
@@ -75,7 +75,7 @@ def _told(error):
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if os.path.dirname(os.path.abspath(frame.filename)) != _OWN]
     frame = (own or list(frames))[-1]
-    return f"{text[:_TEXT]} ({os.path.basename(frame.filename)}:{frame.lineno})"
+    return f"{words.text(text, _TEXT_BYTES)} ({os.path.basename(frame.filename)}:{frame.lineno})"
 
 
 def _score(link, instance, value):

@@ -135,8 +135,7 @@ class ToyHost:
         return Comparison(photo, self.view(pose), self.camera, estimate)
 
     def render(self, poses, stride=1, with_descriptors=True):
-        for pose in poses:
-            yield self.view(Pose(*pose), stride, with_descriptors)
+        return [self.view(Pose(*pose), stride, with_descriptors) for pose in poses]
 
     def compare_views(self, poses, stride=1, ignored_in_photo=(), ignored_in_view=(), boundary_tolerance_px=0.0):
         if boundary_tolerance_px:

@@ -25,6 +25,11 @@ def line(name, value):
     return json.dumps({name: value}, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
+def text(value, most_bytes):
+    """A text, cut to whole characters; a message holds no half of a surrogate pair, as names of files may."""
+    return str(value).encode("utf-8", "replace")[:most_bytes].decode("utf-8", "ignore")
+
+
 def number(value):
     """A number; JSON has no NaN and no infinity, null stands for them."""
     value = float(value)

@@ -14,6 +14,7 @@ from resurvey_plugin import toy, words
 PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 HEADER = 4096
 SCRATCH = 1 << 20
+LONGEST_LINE = 1 << 20
 
 
 class FakeHost:
@@ -26,6 +27,7 @@ class FakeHost:
         self.memory = mmap.mmap(self.file, HEADER)
         self.memory[:8] = b"RSVWIRE1"
         self.size = HEADER
+        self.mark = None
         ours, theirs = socket.socketpair()
         ours.settimeout(20)
         environment = {**os.environ, "PYTHONPATH": package}
@@ -55,7 +57,9 @@ class FakeHost:
 
     def raw(self):
         """The next message, whatever it is."""
-        (name, value), = json.loads(self.lines.readline()).items()
+        line = self.lines.readline()
+        assert len(line) <= LONGEST_LINE, f"a line of {len(line)} bytes"
+        (name, value), = json.loads(line).items()
         return name, value
 
     def ask(self, call, value):
@@ -71,14 +75,15 @@ class FakeHost:
         return self.ask("create", {"settings": json.dumps(settings or {}, separators=(",", ":"), sort_keys=True)})
 
     def lend(self, array, padding=0):
-        """Puts an array into the memory; its rows may be `padding` values longer."""
+        """Puts an array into the memory, which never shrinks; its rows may be `padding` values longer."""
         array = np.asarray(array)
         offset = (self.size + 63) // 64 * 64
         wide = np.zeros((*array.shape[:-1], array.shape[-1] + padding), array.dtype)
         wide[..., :array.shape[-1]] = array
         self.size = offset + wide.nbytes
-        os.ftruncate(self.file, max(self.size, HEADER))
-        self.memory = mmap.mmap(self.file, self.size)
+        if self.size > len(self.memory):
+            os.ftruncate(self.file, self.size)
+            self.memory = mmap.mmap(self.file, self.size)
         self.memory[offset:offset + wide.nbytes] = wide.tobytes()
         dtype = array.dtype.str if array.dtype.fields is None else f"|V{array.dtype.itemsize}"
         return {"dtype": dtype, "shape": list(array.shape), "strides": list(wide.strides), "offset": offset}
@@ -102,6 +107,7 @@ class FakeHost:
         classes = [{key: value for key, value in item._asdict().items() if value is not None} for item in self.world.classes]
         value = {"scratch": {"offset": scratch, "bytes": SCRATCH}, "classes": classes, "photo": self.lend(photo),
                  "camera": {**vars(self.world.camera), "distortion": [0.0] * 5}, **others}
+        self.mark = self.size
         return {**value, "memory": self.size}
 
     def score(self, photo, views, padding=0):
@@ -130,6 +136,7 @@ class FakeHost:
         return self.ask("estimate", {"comparison": self.comparison(photo, pose), "regions": listed})
 
     def _serve(self, name, value):
+        """Answers a request. Like the host, it takes back what it lent with the answer before."""
         if name in ("log", "progress"):
             self.noted.append((name, value))
             return
@@ -137,12 +144,14 @@ class FakeHost:
             self.taken += self.read(value["cells"]).tolist() if name == "heat" else value
             self.send("served", {"memory": self.size})
             return
+        if self.mark is not None:
+            self.size = self.mark
         answer = getattr(self, f"_{name}")(value)
         self.send(*(("error", {"text": answer}) if isinstance(answer, str) else ("served", {**answer, "memory": self.size})))
 
     def _render(self, value):
         poses = self.read(value["poses"])[:2]
-        return {"views": self.stack(list(self.world.render(poses, value["stride"], value["with_descriptors"])))}
+        return {"views": self.stack(self.world.render(poses, value["stride"], value["with_descriptors"]))}
 
     def _compare_views(self, value):
         def listed(sets):

@@ -118,6 +118,12 @@ class WhatGoesWrong(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertIn("Traceback", last_words)
 
+    def test_a_text_that_is_no_unicode_leaves_the_wire_whole(self):
+        world = toy.street(40, 30)
+        with started("    def score(self, photo, view):\n        raise Failed('weights ' + chr(0xDC80))\n", world) as host:
+            answer, _ = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])
+            self.assertEqual(answer, ("failed", {"text": "weights ?"}))
+
     def test_prints_and_readers_leave_the_wire_alone(self):
         world = toy.street(40, 30)
         view = world.view(toy.POSE)
@@ -210,6 +216,35 @@ class AMatcherThatSearches(unittest.TestCase):
                 ("log", {"level": "warning", "text": "the toy host does not offer grid_from_wgs84"}), ("progress", 0.5)])
             self.assertEqual(len(host.taken), 100_000)
             self.assertEqual(host.taken[-1], [*toy.POSE[:2], 0.75])
+
+    def test_a_view_stays_what_it_was_while_other_services_are_used(self):
+        with started('''
+    def search(self, photo, host):
+        from resurvey_plugin import toy
+        world, pose = toy.street(40, 30), photo.prior.pose
+        poses = [pose._replace(easting_m=pose.easting_m + aside) for aside in range(5)]
+        for pose, view in zip(poses, host.render(poses)):
+            host.pixel_rays(pose, np.full((2000, 2), 7.0))
+            assert np.array_equal(view.labels, world.view(pose).labels), pose
+            assert np.array_equal(view.origin, pose.position), pose
+        return Localization(pose, 1.0, np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertEqual(host.search(host.world.photo(toy.POSE))[0], "done")
+
+    def test_wrong_poses_are_told_where_they_are_asked_for(self):
+        with started("    def search(self, photo, host):\n        host.render([(1, 2, 3)])\n", toy.street(40, 30)) as host:
+            name, value = host.search(host.world.photo(toy.POSE))
+            self.assertIn("expected rows of 6 numbers", value["text"])
+
+    def test_a_long_line_of_the_log_is_cut_and_the_wire_stays_whole(self):
+        with started('''
+    def search(self, photo, host):
+        host.log("ä" * 2_000_000)
+        return Localization(photo.prior.pose, 1.0, np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertEqual(host.search(host.world.photo(toy.POSE))[0], "done")
+            (_, words), = host.noted
+            self.assertEqual(words["text"], "ä" * 8192)
 
     def test_many_rows_go_in_as_many_messages_as_the_scratch_needs(self):
         with started('''
