@@ -18,21 +18,21 @@ use trial::{ROOT, Trial, has, readme_block};
 #[test]
 fn the_readme_leads_to_a_running_matcher_in_python() {
     if has(&["python3", "numpy"]) {
-        Trial::new().follow("Python", "my-matcher");
+        Trial::new().follow("Python", 1, "my-matcher");
     }
 }
 
 #[test]
 fn the_readme_leads_to_a_running_matcher_in_c() {
     if has(&["cc", "make"]) {
-        Trial::new().follow("C", "my-c-matcher");
+        Trial::new().follow("C", 0, "my-c-matcher");
     }
 }
 
 #[test]
 fn the_readme_leads_to_a_running_matcher_in_rust() {
     if has(&["cargo"]) {
-        Trial::new().follow("Rust", "my-rust-matcher");
+        Trial::new().follow("Rust", 0, "my-rust-matcher");
     }
 }
 

@@ -118,9 +118,9 @@ impl Trial {
         (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
     }
 
-    /// Types what the section of the README says, and looks at the pose that its last line gives.
-    pub fn follow(&self, heading: &str, name: &str) {
-        self.shell(&readme_block(heading, 0));
+    /// Types what a block of the section of the README says, and looks at the pose that its last line gives.
+    pub fn follow(&self, heading: &str, block: usize, name: &str) {
+        self.shell(&readme_block(heading, block));
         self.finds_the_pose(name);
     }
 

@@ -325,43 +325,113 @@ class DetectorAndEstimator(unittest.TestCase):
 
 
 class TheOneFile(unittest.TestCase):
-    def build(self, directory, source):
-        path = os.path.join(directory, "plug.py")
+    def setUp(self):
+        place = tempfile.TemporaryDirectory()
+        self.addCleanup(place.cleanup)
+        self.directory = place.name
+
+    def write(self, name, source):
+        path = os.path.join(self.directory, name)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
         with open(path, "w", encoding="utf-8") as file:
             file.write(source)
-        return subprocess.run([sys.executable, "-m", "resurvey_plugin", "build", path], capture_output=True, text=True,
-                              env={**os.environ, "PYTHONPATH": PACKAGE})
+        return path
+
+    def build(self, source, *options, name="plug.py", python=sys.executable):
+        return subprocess.run([python, "-m", "resurvey_plugin", "build", *options, self.write(name, source)],
+                              capture_output=True, text=True, env={**os.environ, "PYTHONPATH": PACKAGE})
+
+    def built(self, source, *options):
+        run = self.build(source, *options)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return run.stdout.strip()
+
+    def refusal(self, source, *options, name="plug.py"):
+        run = self.build(source, *options, name=name)
+        self.assertEqual((run.returncode, "Traceback" in run.stderr), (1, False), run.stderr)
+        return run.stderr
+
+    def score_alone(self, built):
+        """What the file scores where nothing else of the author's is."""
+        world = toy.street(40, 30)
+        with tempfile.TemporaryDirectory() as elsewhere:
+            path = os.path.join(elsewhere, os.path.basename(built))
+            os.rename(built, path)
+            with FakeHost([sys.executable, path], package=elsewhere) as host:
+                self.assertEqual(host.raw()[0], "hello")
+                self.assertEqual(host.create(), ("done", {}))
+                answer, scores = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])
+                self.assertEqual(answer, ("done", {}))
+                return scores[0]
 
     def test_it_runs_alone_and_declares_itself_before_it_runs(self):
-        source = SCORER.replace("\nmain(", "\nif __name__ == '__main__':\n    main(")
-        with tempfile.TemporaryDirectory() as directory:
-            run = self.build(directory, source)
-            self.assertEqual((run.returncode, run.stderr), (0, ""))
-            path = run.stdout.strip()
-            with open(path, "rb") as file:
-                first, second = file.readline(), file.readline()
-            self.assertEqual(first, b"#!/usr/bin/env python3\n")
-            declared = json.loads(second.removeprefix(b"# resurvey-plugin: "))
-            os.remove(os.path.join(directory, "plug.py"))
-            host = FakeHost([sys.executable, path], package=directory)
+        path = self.built(SCORER.replace("\nmain(", "\nif __name__ == '__main__':\n    main("))
+        with open(path, "rb") as file:
+            file.readline()
+            second = file.readline()
+        declared = json.loads(second.replace(b"# resurvey-plugin: ", b""))
+        os.remove(os.path.join(self.directory, "plug.py"))
+        with FakeHost([sys.executable, path], package=self.directory) as host:
             said = host.raw()[1]
             self.assertEqual({key: said[key] for key in declared}, declared)
             self.assertEqual(host.create({"void": 255}), ("done", {}))
-            host.close()
 
     def test_the_same_source_gives_the_same_bytes(self):
-        source, files = SCORER.replace("main(Plug)", ""), []
+        files = []
         for _ in range(2):
-            with tempfile.TemporaryDirectory() as directory:
-                with open(self.build(directory, source).stdout.strip(), "rb") as file:
-                    files.append(file.read())
+            with open(self.built(SCORER.replace("main(Plug)", "")), "rb") as file:
+                files.append(file.read())
         self.assertEqual(files[0], files[1])
 
-    def test_a_file_without_a_plugin_is_refused(self):
-        with tempfile.TemporaryDirectory() as directory:
-            run = self.build(directory, "x = 1\n")
-            self.assertEqual(run.returncode, 1)
-            self.assertIn("expected one class made from Plugin, found none", run.stderr)
+    def test_a_dataclass_with_postponed_annotations_is_built(self):
+        source = ("from __future__ import annotations\nfrom dataclasses import dataclass\nimport typing\n"
+                  "@dataclass\nclass Weights:\n    half: typing.ClassVar[float] = 0.5\n    more: float = 0.25\n" + HEAD +
+                  "    def score(self, photo, view):\n        return Weights().more + Weights.half\n")
+        self.assertEqual(self.score_alone(self.built(source)), 0.75)
+
+    def test_a_class_that_others_are_made_from_is_no_second_plugin(self):
+        source = HEAD.replace("class Plug(Plugin)", "class Base(Plugin)") + (
+            "    def score(self, photo, view):\n        return self.VALUE\n"
+            "class Plug(Base):\n    NAME, VALUE = 'plug-two', 0.25\n")
+        path = self.built(source)
+        self.assertEqual(os.path.basename(path), "resurvey-plugin-plug-two")
+        self.assertEqual(self.score_alone(path), 0.25)
+
+    def test_modules_beside_it_that_it_imports_go_along(self):
+        self.write("weights.py", "HALF = 0.5\n")
+        self.write("model/__init__.py", "")
+        self.write("model/net.py", "from weights import HALF\ndef run():\n    return HALF / 2\n")
+        body = "    def score(self, photo, view):\n        return model.net.run()\n"
+        run = self.build("import model.net\n" + HEAD + body)
+        self.assertEqual(run.stderr, "with model/__init__.py, model/net.py, weights.py\n")
+        self.assertEqual(self.score_alone(run.stdout.strip()), 0.25)
+
+    def test_modules_that_are_imported_later_are_named(self):
+        self.write("late.py", "VALUE = 0.125\n")
+        source = HEAD + "    def score(self, photo, view):\n        import late\n        return late.VALUE\n"
+        self.assertEqual(self.score_alone(self.built(source, "--with", os.path.join(self.directory, "late.py"))), 0.125)
+        self.assertIn("expected a Python file below", self.refusal(source, "--with", __file__))
+
+    def test_a_virtual_environment_builds_for_itself(self):
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", "--system-site-packages",
+                        os.path.join(self.directory, "venv")], check=True)
+        python = os.path.join(self.directory, "venv", "bin", "python3")
+        run = self.build(SCORER.replace("main(Plug)", ""), python=python)
+        with open(run.stdout.strip(), "rb") as file:
+            self.assertEqual(file.readline().decode(), f"#!{python}\n")
+
+    def test_an_interpreter_that_no_first_line_can_name_is_refused(self):
+        spaced = os.path.join(self.directory, "my python")
+        os.symlink(sys.executable, spaced)
+        self.assertIn("expected an interpreter without spaces in its path", self.refusal(SCORER, "--python", spaced))
+        self.assertIn("expected the path of an interpreter", self.refusal(SCORER, "--python", "/no/python3"))
+
+    def test_what_is_no_one_plugin_is_refused(self):
+        self.assertIn("expected one class made from Plugin that has a NAME, found none", self.refusal("x = 1\n"))
+        two = HEAD + "    def score(self, photo, view): ...\nclass Other(Plugin):\n    NAME = 'other'\n"
+        self.assertIn("found Plug, Other", self.refusal(two))
+        self.assertIn("below if __name__ ==", self.refusal(SCORER))
+        self.assertIn("json.py hides a module", self.refusal(SCORER, name="json.py"))
 
 
 if __name__ == "__main__":
