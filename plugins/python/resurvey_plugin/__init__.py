@@ -1,4 +1,4 @@
-"""Plugins for resurvey in Python: a matcher, a change detector or a descriptor estimator is one class.
+"""Plugins for resurvey in Python: a matcher, a change detector, a descriptor estimator or a segmenter is one class.
 
     class Agreement(Plugin):
         NAME, VERSION, SUMMARY = "agreement", "1.0.0", "Share of pixels whose class is the same"

@@ -4,7 +4,7 @@ import json
 import re
 
 WIRE = 1
-_CALLS = {"score": "matcher", "search": "matcher", "detect": "detector", "estimate": "estimator"}
+_CALLS = {"score": "matcher", "search": "matcher", "detect": "detector", "estimate": "estimator", "segment": "segmenter"}
 
 
 class Failed(Exception):
@@ -26,7 +26,7 @@ class Settings(dict):
 
 
 class Plugin:
-    """Base of a plugin: `score`, `search`, `detect` or `estimate` makes it one of a kind.
+    """Base of a plugin: `score`, `search`, `detect`, `estimate` or `segment` makes it one of a kind.
 
     An instance lives for a run and is called by one thread at a time.
     """
@@ -48,7 +48,7 @@ def hello(plugin):
     kinds = sorted({_CALLS[call] for call in calls})
     if len(kinds) != 1:
         found = " and ".join(calls) or "none of them"
-        raise TypeError(f"{plugin.__name__} needs score, search, detect or estimate, found {found}")
+        raise TypeError(f"{plugin.__name__} needs score, search, detect, estimate or segment, found {found}")
     if not re.fullmatch(r"[a-z0-9-]{1,47}", plugin.NAME):
         raise ValueError(f"{plugin.__name__}.NAME: expected up to 47 of a-z, 0-9 and dashes, found {plugin.NAME!r}")
     for field, most in (("VERSION", 23), ("SUMMARY", 159)):

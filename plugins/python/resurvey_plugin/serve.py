@@ -142,4 +142,18 @@ def _comparison(link, value):
     return Comparison(link.lent(value["photo"]), view, words.camera(value["camera"]), words.estimate(value["estimate"]))
 
 
-_SERVED = {"score": _score, "search": _search, "detect": _detect, "estimate": _estimate}
+def _segment(link, instance, value):
+    photo = link.lent(value["photo"])
+    rows, columns, _ = photo.shape
+    labels = np.asarray(instance.segment(photo, Host(link, value)))
+    if labels.shape != (rows, columns) or labels.dtype.kind not in "iu":
+        raise TypeError(f"expected segment to return {rows} × {columns} whole numbers, found an array of shape "
+                        f"{labels.shape} and type {labels.dtype}")
+    # Another one would wrap to a class: 256 to stone, and -1, as some networks call what they ignore, to VOID by chance.
+    if labels.size and (labels.min() < 0 or labels.max() > 255):
+        raise ValueError(f"expected labels from 0 to 255, found {labels.min()} to {labels.max()}; what is no class is VOID")
+    link.place(value["labels"])[...] = labels
+    return {}
+
+
+_SERVED = {"score": _score, "search": _search, "detect": _detect, "estimate": _estimate, "segment": _segment}

@@ -123,6 +123,17 @@ class ToyHost:
                     (times * np.linalg.norm(rays, axis=-1)).astype("f4").reshape(shape),
                     points.astype("f4").reshape((*shape, 3)), features[face_of].reshape(shape), table)
 
+    def picture(self, pose):
+        """What a camera at `pose` would take in the colours of the classes: red, green, blue (`uint8` [rows, columns, 3])."""
+        colours = np.zeros((256, 3), dtype="u1")
+        for item in self.classes:
+            colours[item.index] = item.colour
+        return colours[self.view(pose).labels]
+
+    def placeless(self):
+        """The host that a segmenter has: the class table, log, progress and cancellation. Every other service is `Failed`."""
+        return _Placeless(self)
+
     def photo(self, pose, prior=None):
         """A photo of this world taken at `pose`; the comparisons of this host are with the last one."""
         prior = prior or Prior(pose, 5.0, 0.5, 0.1, 0.02)
@@ -232,6 +243,21 @@ class ToyHost:
         if self.scene.ground is not None:
             faces = [*faces, _Face(None, class_index)]
         return nearest, face_of, faces
+
+
+class _Placeless:
+    """A `ToyHost` before anybody knows where the photo was taken."""
+
+    _KEPT = ("classes", "slots", "lines", "fractions", "is_cancelled", "log", "progress", "cancelled", "check_cancelled")
+
+    def __init__(self, host):
+        self._host = host
+
+    def __getattr__(self, name):
+        found = getattr(self._host, name)
+        if name in self._KEPT:
+            return found
+        raise Failed("a segmenter has no map: nobody knows yet where the photo was taken")
 
 
 def camera(width=320, height=240, diagonal_fov_deg=90.0):

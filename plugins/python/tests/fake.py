@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from resurvey_plugin import toy, words
+from resurvey_plugin import Failed, toy, words
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 HEADER = 4096
@@ -103,12 +103,15 @@ class FakeHost:
 
     def call(self, photo, **others):
         """What search and detect have in common."""
+        camera = {**vars(self.world.camera), "distortion": [0.0] * 5}
+        return self._begun({"photo": self.lend(photo), "camera": camera, **others})
+
+    def _begun(self, value):
+        """A call with what all have that may use services."""
         scratch = self.lend(np.zeros(SCRATCH, "u1"))["offset"]
         classes = [{key: value for key, value in item._asdict().items() if value is not None} for item in self.world.classes]
-        value = {"scratch": {"offset": scratch, "bytes": SCRATCH}, "classes": classes, "photo": self.lend(photo),
-                 "camera": {**vars(self.world.camera), "distortion": [0.0] * 5}, **others}
         self.mark = self.size
-        return {**value, "memory": self.size}
+        return {**value, "scratch": {"offset": scratch, "bytes": SCRATCH}, "classes": classes, "memory": self.size}
 
     def score(self, photo, views, padding=0):
         """Answer and scores."""
@@ -125,6 +128,14 @@ class FakeHost:
         estimate = {"pose": list(pose), "covariance": np.diag([0.01, 0.01, 1e-6]).tolist(), "height_sigma_m": 0.05,
                     "tilt_sigma_rad": 0.002, "alignment": None}
         return self.call(photo, estimate=estimate, views=self.stack([self.world.view(pose)]))
+
+    def segment(self, photo):
+        """Answer and labels."""
+        labels = self.lend(np.full(photo.shape[:2], 255, "u1"))
+        call = self._begun({"photo": self.lend(photo), "labels": labels})
+        self.world = self.world.placeless()
+        answer = self.ask("segment", call)
+        return answer, self.read(labels)
 
     def detect(self, photo, pose):
         return self.ask("detect", self.comparison(photo, pose))
@@ -146,7 +157,10 @@ class FakeHost:
             return
         if self.mark is not None:
             self.size = self.mark
-        answer = getattr(self, f"_{name}")(value)
+        try:
+            answer = getattr(self, f"_{name}")(value)
+        except Failed as failure:
+            answer = str(failure)
         self.send(*(("error", {"text": answer}) if isinstance(answer, str) else ("served", {**answer, "memory": self.size})))
 
     def _render(self, value):
@@ -181,8 +195,8 @@ class FakeHost:
         height_m = self.world.ground_height(value["point"])
         return {} if height_m is None else {"height_m": height_m}
 
-    def _grid_from_wgs84(self, _):
-        return "the toy host does not offer grid_from_wgs84"
+    def _grid_from_wgs84(self, value):
+        return {"position": self.world.grid_from_wgs84(value["position"])}
 
 
 def python(source):

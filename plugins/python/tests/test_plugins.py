@@ -170,7 +170,7 @@ class WhatGoesWrong(unittest.TestCase):
         for body in ("    pass", "    def score(self, photo, view): ...\n    def detect(self, comparison, host): ..."):
             run = subprocess.run(python(HEAD + body + "\nmain(Plug)\n"), env={**os.environ, "PYTHONPATH": PACKAGE},
                                  capture_output=True, text=True)
-            self.assertIn("Plug needs score, search, detect or estimate, found", run.stderr)
+            self.assertIn("Plug needs score, search, detect, estimate or segment, found", run.stderr)
 
 
 class AMatcherThatSearches(unittest.TestCase):
@@ -322,6 +322,37 @@ class DetectorAndEstimator(unittest.TestCase):
         with started("    def estimate(self, comparison, regions, host):\n        return []\n", world) as host:
             self.assertEqual(host.estimate(world.view(toy.POSE).labels, toy.POSE, []), ("done", {}))
             self.assertEqual(host.taken, [])
+
+
+class ASegmenter(unittest.TestCase):
+    def segment(self, body, world=None):
+        world = world or toy.street(40, 30)
+        with started("    def segment(self, photo, host):\n        " + body + "\n", world) as host:
+            return host.segment(world.picture(toy.POSE))
+
+    def test_labels_of_any_whole_type_arrive(self):
+        world = toy.street(40, 30)
+        nearest = ("colours = np.array([one.colour for one in host.classes])\n        "
+                   "return np.abs(photo[:, :, None].astype(int) - colours).sum(axis=-1).argmin(axis=-1)")
+        answer, labels = self.segment(nearest, world)
+        self.assertEqual(answer, ("done", {}))
+        np.testing.assert_array_equal(labels, world.view(toy.POSE).labels)
+
+    def test_what_is_no_image_of_labels_is_told(self):
+        for body, words in (("return photo", "shape (30, 40, 3)"), ("return photo[:-1, :, 0]", "shape (29, 40)"),
+                            ("return photo[..., 0] / 255", "type float64"), ("return None", "type object"),
+                            ("return np.full((30, 40), -1)", "found -1 to -1"), ("return np.full((30, 40), 256)", "256")):
+            with self.subTest(body):
+                (name, value), labels = self.segment(body)
+                self.assertEqual(name, "panicked")
+                self.assertIn(words, value["text"])
+                self.assertTrue((labels == 255).all())
+
+    def test_the_photo_cannot_be_written_to_and_there_is_no_map(self):
+        self.assertIn("read-only", self.segment("photo[0] = 1")[0][1]["text"])
+        answer, _ = self.segment("host.ground_height((0, 0, 0))")
+        self.assertEqual(answer[0], "failed")
+        self.assertIn("a segmenter has no map", answer[1]["text"])
 
 
 class TheOneFile(unittest.TestCase):
