@@ -1,6 +1,6 @@
 //! The files of `plugins/templates`, and what stands in them for a project.
 
-use crate::args::{Language, NewKind};
+use crate::args::{Language, NewForm, NewKind};
 
 /// Paths relative to the project, and texts before the project's words are put in.
 type Sources = Vec<(String, &'static str)>;
@@ -11,6 +11,8 @@ pub struct Project<'a> {
     pub name: &'a str,
     /// Its kind.
     pub kind: NewKind,
+    /// Its form; a matcher alone has two.
+    pub form: NewForm,
     /// Its language.
     pub language: Language,
     /// In Rust: the dependency on the SDK, as `Cargo.toml` says it.
@@ -45,13 +47,12 @@ const PACKAGE: [(&str, &str); 10] = package![
 
 /// Path and text of every file, paths relative to the project.
 pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
-    let kind = project.kind.to_string();
     let (sources, verbatim): (Sources, &[(&str, &str)]) = match project.language {
-        Language::Rust => (rust(project.kind), &[]),
+        Language::Rust => (rust(project), &[]),
         Language::C => {
-            (c(project.kind), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
+            (c(project), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
         }
-        Language::Python => (python(project.kind, &kind), &PACKAGE),
+        Language::Python => (python(project), &PACKAGE),
     };
     let written = sources.into_iter().map(|(path, text)| (path, filled_in(project, text)));
     written.chain(verbatim.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned()))).collect()
@@ -62,7 +63,15 @@ pub fn main_file(project: &Project<'_>) -> String {
     match project.language {
         Language::Rust => "src/lib.rs".to_owned(),
         Language::C => "plugin.c".to_owned(),
-        Language::Python => format!("{}.py", project.kind),
+        Language::Python => format!("{}.py", work(project)),
+    }
+}
+
+/// What the plugin does, which names its template: a matcher searches, or has the name of its kind.
+fn work(project: &Project<'_>) -> String {
+    match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Search) => "search".to_owned(),
+        (kind, _) => kind.to_string(),
     }
 }
 
@@ -72,18 +81,20 @@ pub fn steps(project: &Project<'_>) -> Vec<String> {
         Language::Rust => ("cargo build --release".to_owned(), format!("target/release/{}", library(project))),
         Language::C => ("make".to_owned(), library(project)),
         Language::Python => (
-            format!("python3 -m resurvey_plugin build {}.py", project.kind),
+            format!("python3 -m resurvey_plugin build {}", main_file(project)),
             format!("resurvey-plugin-{}", project.name),
         ),
     };
     vec![build, format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"), usage(project)]
 }
 
-fn rust(kind: NewKind) -> Sources {
-    let source = match kind {
-        NewKind::Matcher => template!("rust/matcher.rs"),
-        NewKind::Detector => template!("rust/detector.rs"),
-        NewKind::Estimator => template!("rust/estimator.rs"),
+fn rust(project: &Project<'_>) -> Sources {
+    let source = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => template!("rust/matcher.rs"),
+        (NewKind::Matcher, NewForm::Search) => template!("rust/search.rs"),
+        (NewKind::Detector, _) => template!("rust/detector.rs"),
+        (NewKind::Estimator, _) => template!("rust/estimator.rs"),
+        (NewKind::Segmenter, _) => template!("rust/segmenter.rs"),
     };
     vec![
         ("Cargo.toml".to_owned(), template!("rust/Cargo.toml.in")),
@@ -93,11 +104,13 @@ fn rust(kind: NewKind) -> Sources {
     ]
 }
 
-fn c(kind: NewKind) -> Sources {
-    let source = match kind {
-        NewKind::Matcher => template!("c/matcher.c"),
-        NewKind::Detector => template!("c/detector.c"),
-        NewKind::Estimator => template!("c/estimator.c"),
+fn c(project: &Project<'_>) -> Sources {
+    let source = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => template!("c/matcher.c"),
+        (NewKind::Matcher, NewForm::Search) => template!("c/search.c"),
+        (NewKind::Detector, _) => template!("c/detector.c"),
+        (NewKind::Estimator, _) => template!("c/estimator.c"),
+        (NewKind::Segmenter, _) => template!("c/segmenter.c"),
     };
     vec![
         ("plugin.c".to_owned(), source),
@@ -107,15 +120,17 @@ fn c(kind: NewKind) -> Sources {
     ]
 }
 
-fn python(kind: NewKind, name: &str) -> Sources {
-    let (source, test) = match kind {
-        NewKind::Matcher => (template!("python/matcher.py"), template!("python/test_matcher.py")),
-        NewKind::Detector => (template!("python/detector.py"), template!("python/test_detector.py")),
-        NewKind::Estimator => (template!("python/estimator.py"), template!("python/test_estimator.py")),
+fn python(project: &Project<'_>) -> Sources {
+    let (source, test) = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => (template!("python/matcher.py"), template!("python/test_matcher.py")),
+        (NewKind::Matcher, NewForm::Search) => (template!("python/search.py"), template!("python/test_search.py")),
+        (NewKind::Detector, _) => (template!("python/detector.py"), template!("python/test_detector.py")),
+        (NewKind::Estimator, _) => (template!("python/estimator.py"), template!("python/test_estimator.py")),
+        (NewKind::Segmenter, _) => (template!("python/segmenter.py"), template!("python/test_segmenter.py")),
     };
     vec![
-        (format!("{name}.py"), source),
-        (format!("test_{name}.py"), test),
+        (main_file(project), source),
+        (format!("test_{}", main_file(project)), test),
         ("README.md".to_owned(), template!("python/README.md")),
         (".gitignore".to_owned(), "__pycache__/\nresurvey-plugin-*\n"),
     ]
@@ -128,6 +143,7 @@ fn filled_in(project: &Project<'_>, text: &str) -> String {
         .replace("my_plugin", &project.name.replace('-', "_"))
         .replace(&placeholder, &type_name(project))
         .replace("@KIND@", &project.kind.to_string())
+        .replace("@FILE@", &main_file(project))
         .replace("@USE@", &usage(project))
         .replace("@SDK@", &format!("resurvey-plugin = {}", project.sdk.as_deref().unwrap_or_default()))
 }
@@ -154,10 +170,10 @@ fn library(project: &Project<'_>) -> String {
 }
 
 fn usage(project: &Project<'_>) -> String {
-    let (command, kind) = match project.kind {
-        NewKind::Matcher => ("localize", "matcher"),
-        NewKind::Detector => ("update", "detector"),
-        NewKind::Estimator => ("update", "estimator"),
+    let (command, more) = match project.kind {
+        NewKind::Matcher => ("localize", ""),
+        NewKind::Detector | NewKind::Estimator => ("update", ""),
+        NewKind::Segmenter => ("localize", " --photo photo.jpg"),
     };
-    format!("resurvey {command} city.rsv capture.json --{kind} {}", project.name)
+    format!("resurvey {command} city.rsv capture.json{more} --{} {}", project.kind, project.name)
 }

@@ -149,21 +149,30 @@ class ToyHost:
         return [self.view(Pose(*pose), stride, with_descriptors) for pose in poses]
 
     def compare_views(self, poses, stride=1, ignored_in_photo=(), ignored_in_view=(), boundary_tolerance_px=0.0):
-        if boundary_tolerance_px:
-            raise Failed("the toy host does not count boundaries")
         if self._photo is None:
             raise Failed("the toy host has no photo: call photo first")
         photo = self._photo[::stride, ::stride]
+        takes_part = ~np.isin(photo, [*ignored_in_photo, 255])
         counts = np.zeros((len(poses), self.slots, 7), dtype="u4")
         for count, view in zip(counts, self.render(poses, stride)):
-            compared = ~np.isin(photo, [*ignored_in_photo, 255]) & ~np.isin(view.labels, [*ignored_in_view])
+            compared = takes_part & (photo < self.slots) & (view.labels < self.slots) & ~np.isin(view.labels, [*ignored_in_view])
             for index in range(self.slots):
                 in_photo, in_view = compared & (photo == index), compared & (view.labels == index)
                 count[index, :3] = in_photo.sum(), in_view.sum(), (in_photo & in_view).sum()
+                if boundary_tolerance_px > 0:
+                    edges = [np.argwhere(_boundary(labels == index) & takes_part) for labels in (photo, view.labels)]
+                    near = _near(edges, boundary_tolerance_px / stride)
+                    count[index, 3:] = len(edges[0]), near.any(axis=1).sum(), len(edges[1]), near.any(axis=0).sum()
         return counts
 
-    def compare_panoramas(self, positions, **_):
-        raise Failed("the toy host does not offer compare_panoramas")
+    def compare_panoramas(self, positions, *, columns, yaw_count, yaw_step_columns=1, first_yaw_rad=0.0, pitch_rad=0.0,
+                          roll_rad=0.0, ignored_in_photo=(), ignored_in_view=()):
+        """Compares a view at every heading: it counts pixels where the host counts cells of a panorama, and shares are alike."""
+        step_rad = 2 * np.pi / columns
+        yaws = step_rad * (np.round(first_yaw_rad / step_rad) + yaw_step_columns * np.arange(yaw_count))
+        poses = [(*position, yaw, pitch_rad, roll_rad) for position in positions for yaw in yaws]
+        counts = self.compare_views(poses, 1, ignored_in_photo, ignored_in_view)
+        return counts.reshape(len(positions), yaw_count, self.slots, 7)
 
     def inside_solid(self, points):
         return np.zeros(len(points), dtype=bool)
@@ -322,6 +331,18 @@ def _meet(corners, origin, rays):
     inside = rays * times[:, None] - to_corner
     s, t = inside @ along / (along @ along), inside @ up / (up @ up)
     return np.where((s >= 0) & (s <= 1) & (t >= 0) & (t <= 1), times, np.nan)
+
+
+def _boundary(inside):
+    """Pixels of a mask with a neighbour by their side, inside the image, that is outside of it."""
+    wide = np.pad(inside, 1, constant_values=True)
+    return inside & ~(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])
+
+
+def _near(edges, tolerance_px):
+    """Which pixels of the one list are within the tolerance of which of the other."""
+    between = edges[0][:, None, :] - edges[1][None, :, :]
+    return (between**2).sum(axis=-1) <= tolerance_px**2
 
 
 def _take(nearest, face_of, times, index):

@@ -41,8 +41,8 @@ impl Scorer for MyMatcher {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use resurvey_plugin::toy::trial::{Labels, OFF, best_candidate};
     use resurvey_plugin::toy::create;
+    use resurvey_plugin::toy::trial::{Labels, OFF, best_candidate};
 
     #[test]
     fn the_score_is_the_share_of_equal_pixels() {
