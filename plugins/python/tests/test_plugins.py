@@ -369,8 +369,10 @@ class TheOneFile(unittest.TestCase):
         return path
 
     def build(self, source, *options, name="plug.py", python=sys.executable):
+        # A virtual environment made in another one does not have its NumPy.
+        paths = os.pathsep.join([PACKAGE, os.path.dirname(os.path.dirname(np.__file__))])
         return subprocess.run([python, "-m", "resurvey_plugin", "build", *options, self.write(name, source)],
-                              capture_output=True, text=True, env={**os.environ, "PYTHONPATH": PACKAGE})
+                              capture_output=True, text=True, env={**os.environ, "PYTHONPATH": paths})
 
     def built(self, source, *options):
         run = self.build(source, *options)
@@ -444,7 +446,7 @@ class TheOneFile(unittest.TestCase):
         self.assertIn("expected a Python file below", self.refusal(source, "--with", __file__))
 
     def test_a_virtual_environment_builds_for_itself(self):
-        subprocess.run([sys.executable, "-m", "venv", "--without-pip", "--system-site-packages",
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip",
                         os.path.join(self.directory, "venv")], check=True)
         python = os.path.join(self.directory, "venv", "bin", "python3")
         run = self.build(SCORER.replace("main(Plug)", ""), python=python)
