@@ -14,13 +14,15 @@ It runs in a process of its own and speaks the wire of docs/plugin-wire.md. NumP
 that the host runs.
 """
 
-from .plugin import Cancelled, Failed, Plugin, declaration
+from .host import Host
+from .plugin import Cancelled, Failed, Plugin, Settings, declaration
 from .records import (
     CLASS_COUNTS,
     Alignment,
     Camera,
     ClassInfo,
     Comparison,
+    Descriptor,
     DynamicDescriptor,
     Estimate,
     Localization,
@@ -42,7 +44,7 @@ VOID = 255
 
 __version__ = "0.1.0"
 __all__ = [
-    "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "DynamicDescriptor", "Estimate",
-    "Failed", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "Prior", "Region", "Reject",
-    "Remove", "RunnerUp", "View", "declaration", "main",
+    "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "Descriptor", "DynamicDescriptor",
+    "Estimate", "Failed", "Host", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "Prior", "Region",
+    "Reject", "Remove", "RunnerUp", "Settings", "View", "declaration", "main",
 ]

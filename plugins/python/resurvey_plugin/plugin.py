@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any, Dict, Type
 
 WIRE = 1
 _CALLS = {"score": "matcher", "search": "matcher", "detect": "detector", "estimate": "estimator", "segment": "segmenter"}
@@ -16,9 +17,13 @@ class Cancelled(Exception):
 
 
 class Settings(dict):
-    """The settings, checked and completed by the host: `settings.void` and `settings["void"]` are the same."""
+    """The settings, checked and completed by the host: `settings.void` and `settings["void"]` are the same, also where a
+    setting is called `items` or `values`."""
 
-    def __getattr__(self, name):
+    def __getattribute__(self, name: str) -> Any:
+        return self[name] if dict.__contains__(self, name) else super().__getattribute__(name)
+
+    def __getattr__(self, name: str) -> Any:
         try:
             return self[name]
         except KeyError:
@@ -28,18 +33,26 @@ class Settings(dict):
 class Plugin:
     """Base of a plugin: `score`, `search`, `detect`, `estimate` or `segment` makes it one of a kind.
 
-    An instance lives for a run and is called by one thread at a time.
+    An instance lives for a run and is called by one thread at a time. It has `settings` before its `__init__(self, settings)`
+    begins, which is where weights are loaded.
     """
 
-    NAME = ""
-    VERSION = ""
-    SUMMARY = ""
-    SETTINGS = {}
+    NAME: str = ""
+    VERSION: str = ""
+    SUMMARY: str = ""
+    SETTINGS: Dict[str, Dict[str, Any]] = {}
     """Name of a setting → its flat JSON schema: `type`, `default`, and where it helps `minimum`, `maximum`, `enum`,
     `description` (say the unit)."""
 
-    def __init__(self, settings):
-        self.settings = settings
+    settings: Settings
+
+    def __new__(cls, settings: Settings):
+        instance = super().__new__(cls)
+        instance.settings = settings
+        return instance
+
+    def __init__(self, settings: Settings):
+        pass
 
 
 def hello(plugin):
@@ -68,7 +81,7 @@ def hello(plugin):
     return words
 
 
-def declaration(plugin):
+def declaration(plugin: Type[Plugin]) -> str:
     """The line that the file of the plugin holds, so that the host knows it without running it."""
     words = {key: value for key, value in hello(plugin).items() if key in ("wire", "kind", "name", "version", "summary")}
     return "# resurvey-plugin: " + json.dumps(words)

@@ -116,8 +116,6 @@ def proposal(record, regions):
     if isinstance(record, Remove):
         return {"remove": {"region": index, "class": int(record.class_index), "near": numbers(record.near, 3),
                            "sigma_m": number(record.sigma_m)}}
-    if not isinstance(record, Reject):
-        raise TypeError(f"expected Place, Remove or Reject, found {type(record).__name__}")
     if not 0 <= index < len(regions):
         raise ValueError(f"expected the index of one of {len(regions)} regions, found {index}")
     region = regions[index]

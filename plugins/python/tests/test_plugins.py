@@ -9,7 +9,8 @@ import unittest
 
 import numpy as np
 
-from resurvey_plugin import Pose, Region, toy
+from resurvey_plugin import Failed, Pose, Region, toy
+from resurvey_plugin.plugin import Settings
 
 from .fake import PACKAGE, FakeHost, python
 
@@ -153,6 +154,54 @@ class WhatGoesWrong(unittest.TestCase):
         world = toy.street(40, 30)
         with started("    def score(self, photo, view):\n        exit(0)\n", world) as host:
             self.assertEqual(host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0][0], "panicked")
+
+    def test_a_score_that_is_no_number_is_told_with_what_it_is(self):
+        world = toy.street(40, 30)
+        bodies = {"pass": "expected score to return a number from 0 to 1, found NoneType",
+                  "return (photo == view.labels).mean(axis=0)": "found an array of shape (40,)",
+                  "return 'high'": "found str"}
+        for body, words in bodies.items():
+            with self.subTest(body), started(f"    def score(self, photo, view):\n        {body}\n", world) as host:
+                name, value = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0]
+                self.assertEqual(name, "panicked")
+                self.assertIn(words, value["text"])
+
+    def test_what_is_no_region_or_proposal_is_told_with_what_it_is(self):
+        world = toy.street(40, 30)
+        photo = world.photo(toy.POSE).labels
+        calls = {"detect(self, comparison, host)": "Region", "estimate(self, comparison, regions, host)": "Reject"}
+        for call, what in calls.items():
+            for body, found in (("pass", "NoneType"), ("return [comparison.photo != 3]", "ndarray"), ("return 7", "int")):
+                with self.subTest(call=call, body=body), started(f"    def {call}:\n        {body}\n", world) as host:
+                    name, value = host.detect(photo, toy.POSE) if "detect" in call else host.estimate(photo, toy.POSE, [])
+                    self.assertEqual((name, host.taken), ("panicked", []))
+                    self.assertIn(what, value["text"])
+                    self.assertIn(f"found {found}", value["text"])
+
+    def test_a_mask_that_is_larger_than_the_photo_touches_no_memory(self):
+        world = toy.street(40, 30)
+        body = "    def detect(self, comparison, host):\n        return [Region(0, 1, 0, 0, np.ones((3000, 3000)))]\n"
+        with started(body, world) as host:
+            name, value = host.detect(world.photo(toy.POSE).labels, toy.POSE)
+            self.assertEqual(name, "panicked")
+            self.assertIn("expected a mask within the photo of 30 × 40 pixels, found 3000 × 3000", value["text"])
+
+    def test_an_author_s_own_init_has_the_settings_too(self):
+        world = toy.street(40, 30)
+        with started('''
+    def __init__(self, settings):
+        self.half = 0.5
+    def score(self, photo, view):
+        return self.half * self.settings.void / 255
+''', world) as host:
+            self.assertEqual(host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[1].tolist(), [0.5])
+
+    def test_classes_that_cannot_be_are_not_ignored_in_silence(self):
+        world = toy.street(40, 30)
+        body = "    def search(self, photo, host):\n        host.compare_views([photo.prior.pose], ignored_in_photo=[300])\n"
+        with started(body, world) as host:
+            name, value = host.search(world.photo(toy.POSE))
+            self.assertIn("expected indices of classes from 0 to 254, found 300", value["text"])
 
     def test_settings_that_the_class_does_not_have_are_named(self):
         world = toy.street(40, 30)
@@ -353,6 +402,28 @@ class ASegmenter(unittest.TestCase):
         answer, _ = self.segment("host.ground_height((0, 0, 0))")
         self.assertEqual(answer[0], "failed")
         self.assertIn("a segmenter has no map", answer[1]["text"])
+
+
+class Records(unittest.TestCase):
+    def test_a_setting_may_be_called_as_what_a_dict_has(self):
+        settings = Settings({"items": 3, "values": 0.5, "get": "a"})
+        self.assertEqual((settings.items, settings.values, settings.get, settings["items"]), (3, 0.5, "a", 3))
+        self.assertEqual({**settings}, {"items": 3, "values": 0.5, "get": "a"})
+        self.assertEqual(sorted(Settings({"void": 1}).items()), [("void", 1)])
+
+    def test_a_region_of_parts_has_all_its_pixels(self):
+        region = Region.of(np.array([[0.0, 0.25], [0.0, 1.0]]), 0, 1)
+        self.assertEqual((region.pixels, region.left, region.mask.dtype), (2, 1, np.uint8))
+        with self.assertRaisesRegex(ValueError, "expected a mask of rows and columns"):
+            Region.of(np.ones(7), 0, 1)
+
+    def test_a_class_is_found_by_its_name(self):
+        world = toy.street(40, 30)
+        self.assertEqual(world.class_named("banner").index, toy.BANNER)
+        with self.assertRaisesRegex(Failed, "expected a map with a class tree, found stone, glass"):
+            world.placeless().class_named("tree")
+        with started("    def search(self, photo, host):\n        raise Failed(host.class_named('chair').kind)\n", world) as host:
+            self.assertEqual(host.search(world.photo(toy.POSE)), ("failed", {"text": "dynamic"}))
 
 
 class TheOneFile(unittest.TestCase):

@@ -55,7 +55,8 @@ class MyMatcher(Plugin):
         turns = min(COLUMNS // 2, int(np.ceil(self.settings.reach * prior.yaw_sigma_rad / step_rad)))
         middle = round(prior.pose.yaw_rad / step_rad)
         yaws = step_rad * np.arange(middle - turns, middle + turns + 1)
-        steps = self.settings.step_m * np.arange(-int(radius_m // self.settings.step_m), int(radius_m // self.settings.step_m) + 1)
+        most = int(radius_m // self.settings.step_m)
+        steps = self.settings.step_m * np.arange(-most, most + 1)
         around = np.array([(east, north, 0.0) for east in steps for north in steps if np.hypot(east, north) <= radius_m])
         places = around + prior.pose.position
         places = places[~host.inside_solid(places)]
@@ -101,8 +102,8 @@ class MyMatcher(Plugin):
 
     def covariance(self, pose, score, host, hidden, stride):
         """Second moments of the likelihood over 2 m and 2° around the pose; at least 0.1 m and 0.1°."""
-        offsets = np.array([(east, north, 0.0, yaw, 0.0, 0.0) for east in np.linspace(-2, 2, 7) for north in np.linspace(-2, 2, 7)
-                            for yaw in np.radians(np.linspace(-2, 2, 5))])
+        aside_m, turns_rad = np.linspace(-2, 2, 7), np.radians(np.linspace(-2, 2, 5))
+        offsets = np.array([(east, north, 0, yaw, 0, 0) for east in aside_m for north in aside_m for yaw in turns_rad])
         scores = []
         for part in np.array_split(offsets, 10):
             host.check_cancelled()
