@@ -1,5 +1,5 @@
 """A toy world for tests without a map: painted walls, boxes, a flat ground and descriptors, ray cast exactly for a pinhole
-camera, one ray per pixel. The same as `resurvey_plugin::toy` of the Rust SDK: the oracle, not the renderer.
+camera, one ray per pixel. Seen exactly as by `resurvey_plugin::toy` of the Rust SDK: the oracle, not the renderer.
 
     host = toy.street()
     photo = host.photo(toy.POSE)
