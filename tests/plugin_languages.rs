@@ -39,7 +39,7 @@ fn the_readme_leads_to_a_running_matcher_in_rust() {
 /// Language, its tools, how a project is tested and built, and the file that comes out.
 type InLanguage = (&'static str, &'static [&'static str], &'static str, &'static str);
 const LANGUAGES: [InLanguage; 3] = [
-    ("c", &["cc", "make"], "make", "libmy_NAME.so"),
+    ("c", &["cc", "make"], "make test && make", "libmy_NAME.so"),
     (
         "python",
         &["python3", "numpy"],

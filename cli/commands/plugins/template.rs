@@ -45,13 +45,17 @@ const PACKAGE: [(&str, &str); 10] = package![
     "words.py"
 ];
 
+/// The contract, and the toy host of the project's test.
+const HEADERS: [(&str, &str); 2] = [
+    ("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h")),
+    ("resurvey_toy.h", include_str!("../../../plugins/toy/resurvey_toy.h")),
+];
+
 /// Path and text of every file, paths relative to the project.
 pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
     let (sources, verbatim): (Sources, &[(&str, &str)]) = match project.language {
         Language::Rust => (rust(project), &[]),
-        Language::C => {
-            (c(project), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
-        }
+        Language::C => (c(project), &HEADERS),
         Language::Python => (python(project), &PACKAGE),
     };
     let written = sources.into_iter().map(|(path, text)| (path, filled_in(project, text)));
@@ -105,18 +109,19 @@ fn rust(project: &Project<'_>) -> Sources {
 }
 
 fn c(project: &Project<'_>) -> Sources {
-    let source = match (project.kind, project.form) {
-        (NewKind::Matcher, NewForm::Score) => template!("c/matcher.c"),
-        (NewKind::Matcher, NewForm::Search) => template!("c/search.c"),
-        (NewKind::Detector, _) => template!("c/detector.c"),
-        (NewKind::Estimator, _) => template!("c/estimator.c"),
-        (NewKind::Segmenter, _) => template!("c/segmenter.c"),
+    let (source, test) = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => (template!("c/matcher.c"), template!("c/test_matcher.c")),
+        (NewKind::Matcher, NewForm::Search) => (template!("c/search.c"), template!("c/test_search.c")),
+        (NewKind::Detector, _) => (template!("c/detector.c"), template!("c/test_detector.c")),
+        (NewKind::Estimator, _) => (template!("c/estimator.c"), template!("c/test_estimator.c")),
+        (NewKind::Segmenter, _) => (template!("c/segmenter.c"), template!("c/test_segmenter.c")),
     };
     vec![
         ("plugin.c".to_owned(), source),
+        ("test.c".to_owned(), test),
         ("Makefile".to_owned(), template!("c/Makefile")),
         ("README.md".to_owned(), template!("c/README.md")),
-        (".gitignore".to_owned(), "*.so\n"),
+        (".gitignore".to_owned(), "*.so\ntoy-test\n"),
     ]
 }
 
