@@ -30,6 +30,13 @@ fn the_readme_leads_to_a_running_matcher_in_c() {
 }
 
 #[test]
+fn the_readme_leads_to_a_running_matcher_in_cpp() {
+    if has(&["cc", "c++", "make"]) {
+        Trial::new().follow("C++", 0, "my-cpp-matcher");
+    }
+}
+
+#[test]
 fn the_readme_leads_to_a_running_matcher_in_rust() {
     if has(&["cargo"]) {
         Trial::new().follow("Rust", 0, "my-rust-matcher");
@@ -190,18 +197,20 @@ fn new_refuses_names_that_cannot_be_and_says_which_can() {
 }
 
 #[test]
-fn new_knows_forms_of_matchers_alone() {
+fn new_says_what_it_does_not_begin() {
     let trial = Trial::bare();
     let (code, message) = trial.code("resurvey plugins new mine --kind detector --form search --lang c");
     assert_eq!((code, message.contains("--form search is for a matcher")), (2, true), "{message}");
+    let (code, message) = trial.code("resurvey plugins new mine --kind detector --lang cpp");
+    assert_eq!((code, message.contains("begin others with --lang c")), (2, true), "{message}");
 }
 
 #[test]
 fn nothing_of_a_template_is_left_in_a_project() {
     let trial = Trial::bare();
     let kinds = ["matcher", "matcher --form search", "detector", "estimator", "segmenter"];
-    for language in ["rust", "c", "python"] {
-        for kind in kinds {
+    for language in ["rust", "c", "cpp", "python"] {
+        for kind in kinds.into_iter().filter(|kind| language != "cpp" || *kind == "matcher") {
             let name = format!("{language}-{}", kind.replace(" --form ", "-"));
             trial.shell(&format!("resurvey plugins new {name} --kind {kind} --lang {language}"));
             for text in trial.texts_in(&name) {

@@ -129,6 +129,8 @@ pub enum Language {
     Rust,
     /// One file, the header, a Makefile
     C,
+    /// The same as a class of C++17; a matcher that scores
+    Cpp,
     /// A class on NumPy arrays; runs in a process of its own
     Python,
 }
@@ -158,6 +160,7 @@ impl fmt::Display for Language {
         formatter.write_str(match self {
             Self::Rust => "rust",
             Self::C => "c",
+            Self::Cpp => "cpp",
             Self::Python => "python",
         })
     }

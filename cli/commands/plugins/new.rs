@@ -86,9 +86,15 @@ pub fn run(options: &New, registry: &Registry, console: &mut Console<'_>) -> Res
             options.kind
         )));
     }
+    let is_scorer = matches!(options.kind, NewKind::Matcher) && options.form == NewForm::Score;
+    if matches!(options.lang, Language::Cpp) && !is_scorer {
+        return Err(Failure::usage(
+            "--lang cpp begins a matcher that scores; begin others with --lang c, whose headers are C++ as well",
+        ));
+    }
     let sdk = match options.lang {
         Language::Rust => Some(sdk(options.sdk.as_deref())?),
-        Language::C | Language::Python => None,
+        Language::C | Language::Cpp | Language::Python => None,
     };
     let project = Project { name, kind: options.kind, form: options.form, language: options.lang, sdk };
     let directory = options.out.clone().unwrap_or_else(|| PathBuf::from(name));

@@ -56,6 +56,7 @@ pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
     let (sources, verbatim): (Sources, &[(&str, &str)]) = match project.language {
         Language::Rust => (rust(project), &[]),
         Language::C => (c(project), &HEADERS),
+        Language::Cpp => (cpp(), &HEADERS),
         Language::Python => (python(project), &PACKAGE),
     };
     let written = sources.into_iter().map(|(path, text)| (path, filled_in(project, text)));
@@ -67,6 +68,7 @@ pub fn main_file(project: &Project<'_>) -> String {
     match project.language {
         Language::Rust => "src/lib.rs".to_owned(),
         Language::C => "plugin.c".to_owned(),
+        Language::Cpp => "plugin.cpp".to_owned(),
         Language::Python => format!("{}.py", work(project)),
     }
 }
@@ -83,7 +85,7 @@ fn work(project: &Project<'_>) -> String {
 pub fn steps(project: &Project<'_>) -> Vec<String> {
     let (build, built) = match project.language {
         Language::Rust => ("cargo build --release".to_owned(), format!("target/release/{}", library(project))),
-        Language::C => ("make".to_owned(), library(project)),
+        Language::C | Language::Cpp => ("make".to_owned(), library(project)),
         Language::Python => (
             format!("python3 -m resurvey_plugin build {}", main_file(project)),
             format!("resurvey-plugin-{}", project.name),
@@ -122,6 +124,16 @@ fn c(project: &Project<'_>) -> Sources {
         ("Makefile".to_owned(), template!("c/Makefile")),
         ("README.md".to_owned(), template!("c/README.md")),
         (".gitignore".to_owned(), "*.so\ntoy-test\n"),
+    ]
+}
+
+fn cpp() -> Sources {
+    vec![
+        ("plugin.cpp".to_owned(), template!("cpp/matcher.cpp")),
+        ("test.c".to_owned(), template!("c/test_matcher.c")),
+        ("Makefile".to_owned(), template!("cpp/Makefile")),
+        ("README.md".to_owned(), template!("cpp/README.md")),
+        (".gitignore".to_owned(), "*.so\n*.o\ntoy-test\n"),
     ]
 }
 
