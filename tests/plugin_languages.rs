@@ -206,6 +206,17 @@ fn new_says_what_it_does_not_begin() {
 }
 
 #[test]
+fn what_new_says_comes_next_leads_to_a_pose() {
+    if has(&["cc", "make"]) {
+        let trial = Trial::new();
+        let said = trial.shell("resurvey plugins new my-own --kind matcher --lang c --out projects/mine");
+        let (_, steps) = said.split_once("next:\n").unwrap();
+        assert_eq!(steps.lines().count(), 7, "{steps}");
+        assert!(trial.shell(steps).contains("heading"), "{steps}");
+    }
+}
+
+#[test]
 fn nothing_of_a_template_is_left_in_a_project() {
     let trial = Trial::bare();
     let kinds = ["matcher", "matcher --form search", "detector", "estimator", "segmenter"];

@@ -81,17 +81,22 @@ fn work(project: &Project<'_>) -> String {
     }
 }
 
-/// What to type next, in the directory of the project.
+/// What to type next, in the directory of the project, and at last where the user was before.
 pub fn steps(project: &Project<'_>) -> Vec<String> {
-    let (build, built) = match project.language {
-        Language::Rust => ("cargo build --release".to_owned(), format!("target/release/{}", library(project))),
-        Language::C | Language::Cpp => ("make".to_owned(), library(project)),
+    let (test, build, built) = match project.language {
+        Language::Rust => {
+            ("cargo test", "cargo build --release".to_owned(), format!("target/release/{}", library(project)))
+        }
+        Language::C | Language::Cpp => ("make test", "make".to_owned(), library(project)),
         Language::Python => (
+            "python3 -m unittest",
             format!("python3 -m resurvey_plugin build {}", main_file(project)),
             format!("resurvey-plugin-{}", project.name),
         ),
     };
-    vec![build, format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"), usage(project)]
+    let (check, install) = (format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"));
+    // Back to where the map is.
+    vec![test.to_owned(), build, check, install, "cd -".to_owned(), usage(project)]
 }
 
 fn rust(project: &Project<'_>) -> Sources {

@@ -30,6 +30,7 @@ from .records import (
     Photo,
     Place,
     Pose,
+    PoseEstimate,
     Prior,
     Region,
     Reject,
@@ -45,6 +46,6 @@ VOID = 255
 __version__ = "0.1.0"
 __all__ = [
     "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "Descriptor", "DynamicDescriptor",
-    "Estimate", "Failed", "Host", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "Prior", "Region",
-    "Reject", "Remove", "RunnerUp", "Settings", "View", "declaration", "main",
+    "Estimate", "Failed", "Host", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "PoseEstimate", "Prior",
+    "Region", "Reject", "Remove", "RunnerUp", "Settings", "View", "declaration", "main",
 ]

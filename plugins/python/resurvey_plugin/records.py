@@ -94,6 +94,10 @@ class Estimate:
     alignment: Optional[Alignment] = None
 
 
+PoseEstimate = Estimate
+"""The name that Rust and C have for it."""
+
+
 @dataclass(frozen=True)
 class Photo:
     """Labels of a photo (`uint8` [rows, columns]), its camera and the phone's prior."""

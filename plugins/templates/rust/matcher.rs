@@ -44,6 +44,7 @@ mod tests {
     use resurvey_plugin::toy::create;
     use resurvey_plugin::toy::trial::{Labels, OFF, best_candidate};
 
+    /// Of this score alone: another has other numbers.
     #[test]
     fn the_score_is_the_share_of_equal_pixels() {
         let (photo, view) = (Labels::new(3, &[0, 0, 1, 255, 6, 6]), Labels::new(3, &[0, 1, 1, 1, 6, 6]));
