@@ -6,7 +6,7 @@ mod plugins;
 
 pub use eval::{Eval, Experiment, TableV};
 pub use history::{Changes, Diff, DiffFormat, Gc, ProposalAction, Proposals, Retry, Revert, Tag};
-pub use plugins::{Check, Install, Language, Limits, New, NewKind, Plugins};
+pub use plugins::{Check, Install, Language, Limits, New, NewForm, NewKind, Plugins};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
