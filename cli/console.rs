@@ -15,12 +15,13 @@ pub struct Console<'a> {
     err: &'a mut dyn Write,
     is_json: bool,
     shows_progress: bool,
+    done: Vec<String>,
 }
 
 impl<'a> Console<'a> {
     /// A console; `is_json` is the `--json` option.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, is_json: bool, shows_progress: bool) -> Self {
-        Self { out, err, is_json, shows_progress }
+        Self { out, err, is_json, shows_progress, done: Vec::new() }
     }
 
     /// Whether results are JSON.
@@ -47,6 +48,16 @@ impl<'a> Console<'a> {
     /// Tells the user something that is not a result. A closed standard error is nobody's loss.
     pub fn message(&mut self, text: &str) {
         let _ = writeln!(self.err, "{text}");
+    }
+
+    /// Notes what is on disk now, for a user who cannot be told the result.
+    pub fn did(&mut self, what: impl std::fmt::Display) {
+        self.done.push(what.to_string());
+    }
+
+    /// What was noted.
+    pub fn take_done(self) -> Vec<String> {
+        self.done
     }
 
     /// A stage with a progress bar, when standard error is a terminal.

@@ -78,12 +78,6 @@ impl Failure {
     pub fn code(&self) -> u8 {
         self.code
     }
-
-    /// Whether the reader of the output went away, which is no failure.
-    pub fn is_closed_pipe(&self) -> bool {
-        let is_closed = |error: &std::io::Error| error.kind() == std::io::ErrorKind::BrokenPipe;
-        self.error.downcast_ref::<std::io::Error>().is_some_and(is_closed)
-    }
 }
 
 impl fmt::Display for Failure {

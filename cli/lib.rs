@@ -7,6 +7,7 @@ mod console;
 mod document;
 mod failure;
 mod matching;
+mod output;
 mod prior;
 mod region;
 mod report;
@@ -20,7 +21,8 @@ use commands::{
     query, render, replay, revert, tag, update,
 };
 use console::Console;
-use failure::{Failure, USAGE};
+use failure::{Failure, INPUT, USAGE};
+use output::Output;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -54,34 +56,32 @@ where
         Err(error) => return explain(&error, out, err),
     };
     cli.plugins.program = host.program;
-    let mut console = Console::new(out, err, cli.json, host.shows_progress);
-    let result = dispatch(&cli, &mut console)
-        .or_else(|failure| tell(failure, &mut console))
-        .and_then(|code| Ok(console.out().flush().map(|()| code)?));
-    exit_code(result, err)
+    let mut output = Output::new(out);
+    let mut console = Console::new(&mut output, err, cli.json, host.shows_progress);
+    let result = dispatch(&cli, &mut console).map_err(|failure| tell(failure, &mut console));
+    let done = console.take_done();
+    exit_code(result, &done, output, err)
 }
 
 /// Prints the document of a failure that has one, for machines.
-fn tell(mut failure: Failure, console: &mut Console<'_>) -> Result<u8, Failure> {
-    if let Some(document) = failure.take_document().filter(|_| console.is_json()) {
-        console.document(&document)?;
-        console.out().flush()?;
+fn tell(mut failure: Failure, console: &mut Console<'_>) -> Failure {
+    match failure.take_document().filter(|_| console.is_json()) {
+        Some(document) => console.document(&document).err().unwrap_or(failure),
+        None => failure,
     }
-    Err(failure)
 }
 
-/// The code of a result; says on standard error why it is none.
-fn exit_code(result: Result<u8, Failure>, err: &mut dyn Write) -> u8 {
-    match result {
-        Ok(code) => code,
-        // The reader has what it wanted.
-        Err(failure) if failure.is_closed_pipe() => 0,
-        Err(failure) => {
-            // A closed standard error is nobody's loss.
-            let _ = writeln!(err, "resurvey: {failure}");
-            failure.code()
-        }
-    }
+/// The code of a result; says on standard error why it is none, and what was `done` where `output` could not say it. A
+/// closed standard error is nobody's loss.
+fn exit_code(result: Result<u8, Failure>, done: &[String], output: Output<'_>, err: &mut dyn Write) -> u8 {
+    let code = result.unwrap_or_else(|failure| {
+        let _ = writeln!(err, "resurvey: {failure}");
+        failure.code()
+    });
+    let Err(error) = output.finish() else { return code };
+    let done: String = done.iter().map(|done| format!("{done}; ")).collect();
+    let _ = writeln!(err, "resurvey: {done}standard output: {error}");
+    if code == 0 { INPUT } else { code }
 }
 
 /// Prints help to standard output, a usage error to standard error.
@@ -91,8 +91,9 @@ fn explain(error: &clap::Error, out: &mut dyn Write, err: &mut dyn Write) -> u8 
         let _ = write!(err, "{text}");
         return USAGE;
     }
-    let written = write!(out, "{text}").and_then(|()| out.flush());
-    exit_code(written.map(|()| 0).map_err(Failure::from), err)
+    let mut output = Output::new(out);
+    let written = write!(output, "{text}");
+    exit_code(written.map(|()| 0).map_err(Failure::from), &[], output, err)
 }
 
 fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {

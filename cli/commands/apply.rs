@@ -26,6 +26,7 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
     transaction.idempotency_key.clone_from(&options.retry.idempotency_key);
     let committed = map.commit(&transaction, Timestamp::now());
     let version = committed.map_err(|error| Failure::from(error).about(&options.file))?;
+    console.did(format_args!("version {version} was committed"));
     let counts = map.version(version)?.counts;
     if console.is_json() {
         console.document(&json!({

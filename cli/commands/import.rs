@@ -45,6 +45,7 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
     let version = map.commit(&transaction, Timestamp::now())?;
     console.finish(&stage);
+    console.did(format_args!("version {version} was committed"));
     for (file, report) in &reports {
         for warning in &report.warnings {
             console.message(&format!("{file}: {warning}"));

@@ -35,6 +35,7 @@ pub fn run(options: &Init, console: &mut Console<'_>) -> Result<u8, Failure> {
             (error @ StoreError::Io { .. }, _) => Failure::new(INPUT, error),
             (error, _) => error.into(),
         })?;
+    console.did(format_args!("{} was made", options.map.display()));
     if console.is_json() {
         let frame = map.info()?.frame;
         console.document(&json!({

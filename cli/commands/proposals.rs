@@ -26,6 +26,7 @@ pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure
         ProposalAction::Reject => {
             let id = id()?;
             MapFile::open(&options.map)?.reject(id, &options.by, &options.note, Timestamp::now())?;
+            console.did(format_args!("proposal {id} was rejected"));
             if console.is_json() {
                 console.document(&json!({ "id": id, "status": "rejected" }))?;
             } else {
@@ -98,6 +99,7 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
         refuse_what_is_there(&map, &proposal)?;
     }
     let version = map.accept(id, &options.by, &options.note, Timestamp::now())?;
+    console.did(format_args!("proposal {id} was accepted as version {version}"));
     if console.is_json() {
         console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;
     } else {

@@ -25,6 +25,7 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
         (None, Some(revision)) => {
             wish.version = map.resolve(revision)?;
             let version = map.revert(&wish, Timestamp::now())?;
+            console.did(format_args!("version {version} was committed"));
             let document = undone(&map, wish.version, version)?;
             if console.is_json() {
                 console.document(&document)?;
@@ -40,6 +41,7 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let versions = map.versions_by(build)?;
     let done = map.revert_all(&versions, wish, Timestamp::now())?;
+    done.iter().for_each(|(_, version)| console.did(format_args!("version {version} was committed")));
     let documents =
         done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;
     if console.is_json() {

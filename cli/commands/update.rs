@@ -201,6 +201,9 @@ impl Run<'_> {
         let work = self.read(path, given.map(|given| given.pose), from, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
+        if let Some(version) = committed.version {
+            console.did(format_args!("version {version} was committed"));
+        }
         let used = (tools.matcher.info(), tools.comparers.used.as_slice());
         let (document, code) = self.report(path, &work, &outcome, &committed, used, console)?;
         if let Some(reports) = reports {
