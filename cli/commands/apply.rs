@@ -27,10 +27,11 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
     let committed = map.commit(&transaction, Timestamp::now());
     let version = committed.map_err(|error| Failure::from(error).about(&options.file))?;
     console.did(format_args!("version {version} was committed"));
-    let counts = map.version(version)?.counts;
+    let record = map.version(version)?;
+    let counts = record.counts;
     if console.is_json() {
         console.document(&json!({
-            "base_version": head.0, "version": version.0,
+            "base_version": record.base.map(|base| base.0), "version": version.0,
             "added": counts.added, "modified": counts.modified, "removed": counts.removed,
         }))?;
     } else {

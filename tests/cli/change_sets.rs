@@ -1,6 +1,7 @@
 //! `apply`: a change set whole, or refused whole.
 
 use crate::bench::{Bench, edited};
+use crate::differences::chair_at;
 use serde_json::{Value, json};
 
 /// A point of the street, 30 m from its origin.
@@ -118,4 +119,14 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
     bench.run("apply", &["/nowhere.jsonl"]).refused(10, &["/nowhere.jsonl"]);
     let binary = bench.file("set.jsonl", [0xff_u8; 64]);
     bench.run("apply", &[&binary]).refused(10, &["set.jsonl"]);
+}
+
+#[test]
+fn the_base_that_is_printed_is_the_base_in_the_log() {
+    let bench = furnished();
+    bench.apply(&[json!({"op": "add", "after": chair_at(100.0)})]);
+    let file = bench.file("late.jsonl", set(Some(1), &[json!({"op": "add", "after": chair_at(200.0)})]));
+    let applied = bench.json("apply", &[&file]);
+    assert_eq!((&applied["base_version"], &applied["version"]), (&json!(1), &json!(3)));
+    assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["base_version"], applied["base_version"]);
 }
