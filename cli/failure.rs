@@ -69,6 +69,19 @@ impl Failure {
         }
     }
 
+    /// The same with what machines are told.
+    pub fn with_document(self, document: Value) -> Self {
+        Self { document: Some(Box::new(document)), ..self }
+    }
+
+    /// The same with one more key in what machines are told, if they are told something.
+    pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
+        if let Some(document) = &mut self.document {
+            document[key] = value.into();
+        }
+        self
+    }
+
     /// What machines are told, once.
     pub fn take_document(&mut self) -> Option<Value> {
         self.document.take().map(|document| *document)
@@ -152,7 +165,15 @@ impl From<StoreError> for Failure {
             StoreError::Revision(_) | StoreError::TagName { .. } => USAGE,
             _ => INPUT,
         };
-        Self::new(code, error)
+        let document = match &error {
+            StoreError::Busy { .. } => Some(json!({ "decision": "busy", "version": null })),
+            StoreError::ProposalDecided { id, status } => {
+                Some(json!({ "decision": "conflict", "id": id, "status": status, "version": null }))
+            }
+            _ => None,
+        };
+        let failure = Self::new(code, error);
+        document.into_iter().fold(failure, Self::with_document)
     }
 }
 
@@ -162,10 +183,11 @@ impl From<CommitError> for Failure {
             CommitError::Conflict { base, head, ref changed, ref looked_at } => {
                 let next = "look at the features with \"resurvey query\" and work the change out again";
                 let document = conflict(base, head, changed, looked_at);
-                let failure = Self::new(CONFLICT, anyhow::anyhow!("{error}; {next}"));
-                Self { document: Some(Box::new(document)), ..failure }
+                Self::new(CONFLICT, anyhow::anyhow!("{error}; {next}")).with_document(document)
             }
-            CommitError::NothingToRevert { .. } => Self::new(NOTHING, error),
+            CommitError::NothingToRevert { version, .. } => Self::new(NOTHING, error).with_document(json!({
+                "decision": "nothing", "reverts": version.0, "version": null, "added": 0, "modified": 0, "removed": 0,
+            })),
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
         }
@@ -173,7 +195,7 @@ impl From<CommitError> for Failure {
 }
 
 /// The document of a conflict.
-fn conflict(base: VersionId, head: VersionId, changed: &[ConflictingChange], looked_at: &[VersionId]) -> Value {
+pub fn conflict(base: VersionId, head: VersionId, changed: &[ConflictingChange], looked_at: &[VersionId]) -> Value {
     let one = |change: &ConflictingChange| {
         json!({
             "fid": change.fid.0,

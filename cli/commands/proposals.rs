@@ -4,10 +4,12 @@ use super::diff::Sides;
 use crate::args::{ProposalAction, Proposals};
 use crate::commands::evidence;
 use crate::console::Console;
-use crate::failure::{CONFLICT, Failure};
+use crate::failure::{CONFLICT, Failure, conflict};
 use comfy_table::{Table, presets};
 use jiff::Timestamp;
-use resurvey_core::store::{History, MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot};
+use resurvey_core::store::{
+    ConflictingChange, History, MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot,
+};
 use resurvey_core::update::in_the_way;
 use resurvey_core::version::{BoxMm, Delta, FeatureState, Fid};
 use resurvey_schema::{ClassTable, Descriptor};
@@ -98,7 +100,8 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
     if proposal.status == ProposalStatus::Open {
         refuse_what_is_there(&map, &proposal)?;
     }
-    let version = map.accept(id, &options.by, &options.note, Timestamp::now())?;
+    let accepted = map.accept(id, &options.by, &options.note, Timestamp::now());
+    let version = accepted.map_err(|error| of_proposal(error.into(), &proposal))?;
     console.did(format_args!("proposal {id} was accepted as version {version}"));
     if console.is_json() {
         console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;
@@ -108,15 +111,30 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
     Ok(0)
 }
 
+/// A conflict of the proposal, for machines too.
+fn of_proposal(failure: Failure, proposal: &Proposal) -> Failure {
+    failure.with("id", proposal.id).with("status", status(proposal))
+}
+
 /// Refuses to put on the map what another update put there since.
 fn refuse_what_is_there(map: &MapFile, proposal: &Proposal) -> Result<(), Failure> {
-    let snapshot = map.snapshot(map.head()?)?;
+    let head = map.head()?;
+    let snapshot = map.snapshot(head)?;
     for state in &proposal.transaction.additions {
         let FeatureState::Descriptor(added) = state else { continue };
         if let Some(fid) = in_the_way(added, &descriptors_near(&snapshot, &state.bounds()?)?) {
             let next = format!("look at both with \"resurvey why\" and \"proposals show {}\"", proposal.id);
             let text = format!("feature {fid} is where proposal {} puts its own; {next}", proposal.id);
-            return Err(Failure::new(CONFLICT, anyhow::anyhow!(text)));
+            let there = map.feature(head, Fid(fid))?;
+            let change = ConflictingChange {
+                fid: there.fid,
+                changed_in: Some(there.from),
+                found: Some(there.state),
+                is_target: false,
+            };
+            let document = conflict(proposal.transaction.base, head, &[change], &[]);
+            let failure = Failure::new(CONFLICT, anyhow::anyhow!(text)).with_document(document);
+            return Err(of_proposal(failure, proposal));
         }
     }
     Ok(())

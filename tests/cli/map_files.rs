@@ -145,6 +145,8 @@ fn a_map_that_another_writes_is_exit_21_after_a_wait() {
          {\"op\":\"add\",\"after\":{\"class\":\"chair\",\"position\":[835600,817800,4.5]}}\n",
     );
     bench.refuses("apply", &[&changes], 21, &["another process is writing", "try again"]);
+    let busy = bench.run("apply", &[&changes, "--json"]);
+    assert_eq!((busy.code, busy.json()), (21, serde_json::json!({"decision": "busy", "version": null})));
     // Readers are not held up.
     assert_eq!(bench.json("query", &[])["version"], 1);
     writer.execute_batch("ROLLBACK").unwrap();

@@ -99,6 +99,15 @@ fn what_is_on_the_map_by_now_is_not_accepted_again() {
     assert_eq!(update(&bench, &other, &["--propose"])["proposals"], json!([2]));
     bench.json("proposals", &["accept", "2"]);
     bench.run("proposals", &["accept", "1"]).refused(21, &["is where proposal 1 puts its own", "proposals show 1"]);
+    let taken = bench.run("proposals", &["accept", "1", "--json"]);
+    let fid = bench.json("query", &["--class", "banner"])["features"][0]["fid"].clone();
+    let there = json!([{"fid": fid, "changed_in": 2, "is_on_map": true, "is_target": false}]);
+    let expected = json!({"decision": "conflict", "base_version": 1, "head": 2, "version": null, "conflicts": there,
+        "looked_at_by": [], "id": 1, "status": "open"});
+    assert_eq!((taken.code, taken.json()), (21, expected));
+    let decided = bench.run("proposals", &["reject", "2", "--json"]);
+    let expected = json!({"decision": "conflict", "id": 2, "status": "accepted", "version": null});
+    assert_eq!((decided.code, decided.json()), (21, expected));
     assert_eq!(bench.json("query", &["--class", "banner"])["features"].as_array().map(Vec::len), Some(1));
     assert_eq!((bench.head(), bench.json("proposals", &[])["proposals"][0]["id"].clone()), (2, json!(1)));
 }

@@ -48,6 +48,13 @@ fn an_undo_that_has_nothing_to_undo_is_exit_20() {
     let bench = changed();
     bench.run("revert", &["2", "--bbox", "0,0,1,1"]).refused(20, &["version 2 changed nothing in the region"]);
     bench.run("revert", &["0"]).refused(20, &["version 0 changed nothing"]);
+    for words in [&["2", "--bbox", "0,0,1,1", "--json"][..], &["0", "--json"]] {
+        let run = bench.run("revert", words);
+        let reverts: u64 = words[0].parse().unwrap();
+        let expected = json!({"decision": "nothing", "reverts": reverts, "version": null, "added": 0, "modified": 0,
+            "removed": 0});
+        assert_eq!((run.code, run.json()), (20, expected));
+    }
     bench.run("revert", &["7"]).refused(11, &["no version 7; the newest is 2"]);
     bench.run("revert", &["@1999-12-31"]).refused(11, &["no version at 1999-12-31"]);
     assert_eq!(bench.head(), 2);
