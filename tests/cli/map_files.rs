@@ -154,3 +154,29 @@ fn a_map_that_another_writes_is_exit_21_after_a_wait() {
     bench.run("apply", &[&changes]).ok();
     assert_eq!(bench.head(), 2);
 }
+
+#[test]
+fn a_file_too_damaged_to_open_is_told_by_fsck_as_any_damage() {
+    let bench = Bench::with_street();
+    let whole = fs::read(bench.path("map.rsv")).unwrap();
+    let mut headless = whole.clone();
+    headless[..100].fill(0);
+    let files = [
+        ("cut.rsv", &whole[..whole.len() / 2 + 100], "it ends after"),
+        ("headless.rsv", &headless, "another kind of file"),
+        ("empty.rsv", &[], "an empty file"),
+    ];
+    for (name, bytes, word) in files {
+        let file = bench.file(name, bytes);
+        for words in [&["fsck", file.as_str(), "--json"][..], &["fsck", &file, "--json", "--repair"]] {
+            let run = resurvey(words);
+            assert_eq!(run.code, 13, "{}", run.err);
+            let document = run.json();
+            let problem = document["problems"][0].as_str().unwrap();
+            assert!(document["ok"] == false && problem.starts_with("file: ") && problem.contains(word), "{document}");
+            assert!(!run.err.contains("resurvey fsck"), "fsck sends to itself: {}", run.err);
+        }
+    }
+    let missing = resurvey(&["fsck", text(&bench.path("none.rsv")), "--json"]);
+    missing.refused(11, &["no such map"]);
+}
