@@ -62,7 +62,9 @@ impl Failure {
     /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
-        if self.code == MAP || self.to_string().contains(&place) {
+        let is_of_map =
+            matches!(self.error.downcast_ref(), Some(StoreError::Busy { .. } | StoreError::Internal { .. }));
+        if self.code == MAP || is_of_map || names(&self.to_string(), &place) {
             self
         } else {
             Self { error: self.error.context(place), ..self }
@@ -104,6 +106,12 @@ impl fmt::Display for Failure {
         }
         formatter.write_str(&said)
     }
+}
+
+/// Whether `message` says that what follows is about the file at `place`.
+fn names(message: &str, place: &str) -> bool {
+    let begins = message.strip_prefix(place).is_some_and(|rest| rest.starts_with([':', ',', ' ']));
+    begins || message.contains(&format!(": {place}: "))
 }
 
 macro_rules! failure_from {
@@ -233,5 +241,25 @@ impl From<UpdateError> for Failure {
             UpdateError::Geometry { .. } => Self::new(MAP, error),
             _ => Self::new(INPUT, error),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_once_however_short_its_name() {
+        let about = |text: &str, file: &str| Failure::input(text).about(Path::new(file)).to_string();
+        assert_eq!(about("expected a header", "a"), "a: expected a header");
+        assert_eq!(about("a: expected a header", "a"), "a: expected a header");
+        assert_eq!(about("a, line 3: expected a header", "a"), "a, line 3: expected a header");
+        assert_eq!(about("banner: expected a header", "ban"), "ban: banner: expected a header");
+    }
+
+    #[test]
+    fn what_keeps_the_map_busy_is_not_the_doing_of_a_file() {
+        let busy = Failure::from(StoreError::Busy { path: "city.rsv".into() });
+        assert!(busy.about(Path::new("set.jsonl")).to_string().starts_with("city.rsv: another process"));
     }
 }
