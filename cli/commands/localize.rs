@@ -33,14 +33,18 @@ pub fn run(options: &Localize, plugins: &PluginSearch, console: &mut Console<'_>
     let mut timings = Map::new();
     let stage = console.stage("read");
     let from = (&options.prior, segmenting.as_mut());
-    let Placed { capture, world, prior } = read_placed(&options.capture, from, None, (&snapshot, crs), console)?;
+    let placed = read_placed(&options.capture, from, None, (&snapshot, crs), console);
     timings.insert("read".to_owned(), json!(console.finish(&stage)));
+    let Placed { capture, world, prior } = placed?;
     let stage = console.stage("localize");
     let services = SceneServices::new(&world, &capture, crs, &stage);
-    let located = localize(&mut matcher, &services, &choices.gate, &choices.search)?;
+    let located = localize(&mut matcher, &services, &choices.gate, &choices.search);
     // A plugin that crashes as it ends has not kept its word either.
-    matcher.finish()?;
+    let ended = if located.is_ok() { matcher.finish() } else { Ok(()) };
+    // What the matcher said comes before why it failed.
     timings.insert("localize".to_owned(), json!(console.finish(&stage)));
+    let located = located?;
+    ended?;
     if let Some(path) = &options.heatmap {
         let picture = heat_map(&HeatMap {
             heat: &located.localization.heat,

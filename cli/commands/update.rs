@@ -232,8 +232,9 @@ impl Run<'_> {
         let base = self.map.head()?;
         let snapshot = self.map.snapshot(base)?;
         let stage = console.stage("read");
-        let Placed { capture, world, prior } = read_placed(path, from, given, (&snapshot, self.crs), console)?;
+        let placed = read_placed(path, from, given, (&snapshot, self.crs), console);
         self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
+        let Placed { capture, world, prior } = placed?;
         Ok(Work { base, capture, world, prior })
     }
 
@@ -258,9 +259,9 @@ impl Run<'_> {
             comparers.estimator.finish()?;
         }
         let stage = console.stage("commit");
-        let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
+        let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used);
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
-        Ok((outcome, committed))
+        Ok((outcome, committed?))
     }
 
     fn locate(
@@ -276,11 +277,12 @@ impl Run<'_> {
         }
         let stage = console.stage("localize");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search)?;
-        if self.is_last {
-            tools.matcher.finish()?;
-        }
+        let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search);
+        let ended = if self.is_last && located.is_ok() { tools.matcher.finish() } else { Ok(()) };
+        // What the matcher said comes before why it failed.
         self.timings.insert("localize".to_owned(), json!(console.finish(&stage)));
+        let located = located?;
+        ended?;
         Ok(located)
     }
 
@@ -304,12 +306,14 @@ impl Run<'_> {
         time("view", console, &stage);
         let stage = console.stage("detect");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let regions = comparison.detect(&mut comparers.detector, &services)?;
+        let regions = comparison.detect(&mut comparers.detector, &services);
         time("detect", console, &stage);
+        let regions = regions?;
         let stage = console.stage("estimate");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions)?;
+        let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions);
         time("estimate", console, &stage);
+        let proposals = proposals?;
         let resolution = resolve(proposals.clone(), &regions, world.descriptors());
         let viewed_region = comparison.viewed_region();
         Ok((resolution, viewed_region, Seen { view, regions, proposals }))
