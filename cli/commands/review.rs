@@ -52,7 +52,7 @@ impl Run<'_> {
             .collect();
         let evidence = Observation { decision: Decision::Proposed, ..evidence.clone() };
         let proposals = self.map.propose_each(&proposed, &evidence, now)?;
-        let waiting = Committed { decision: Decision::Proposed, version: None, fids: Vec::new(), proposals };
+        let waiting = Committed { proposals, ..Committed::nothing(Decision::Proposed) };
         let Review::Confirm(captures) = review else { return Ok(waiting) };
 
         let confirmed = self.confirmed(&waiting.proposals, captures)?;

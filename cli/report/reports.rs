@@ -13,6 +13,8 @@ pub struct Reports {
     /// Names that are taken, in lower case: some file systems do not tell cases apart.
     taken: Vec<String>,
     entries: Vec<Entry>,
+    /// What could not be written first.
+    failed: Option<Failure>,
 }
 
 impl Reports {
@@ -20,25 +22,45 @@ impl Reports {
     pub fn start(directory: &Path) -> Result<Self, Failure> {
         let wrong = |error: std::io::Error| Failure::input(format!("{}: {error}", directory.display()));
         std::fs::create_dir_all(directory).map_err(wrong)?;
-        let mut reports =
-            Self { directory: directory.to_owned(), taken: vec!["index".to_owned()], entries: Vec::new() };
+        let mut reports = Self {
+            directory: directory.to_owned(),
+            taken: vec!["index".to_owned()],
+            entries: Vec::new(),
+            failed: None,
+        };
         reports.write_index()?;
         Ok(reports)
     }
 
-    /// Writes the page of a capture, and the index anew.
-    pub fn add(&mut self, sheet: &Sheet<'_>) -> Result<(), Failure> {
+    /// Writes the page of a capture, and the index anew. What cannot be written is kept for [`Self::finish`]: the capture
+    /// is in the map whatever becomes of its page.
+    pub fn add(&mut self, sheet: &Sheet<'_>) {
+        let written = self.write(sheet);
+        self.note(written);
+    }
+
+    /// Says in the index that the run met a capture that could not be worked on.
+    pub fn add_failure(&mut self, path: &Path, failure: &Failure) {
+        let name = self.free_name(path);
+        self.entries.push(Entry::failed(name, path, failure));
+        let written = self.write_index();
+        self.note(written);
+    }
+
+    /// What could not be written first.
+    pub fn finish(self) -> Result<(), Failure> {
+        self.failed.map_or(Ok(()), Err)
+    }
+
+    fn note(&mut self, written: Result<(), Failure>) {
+        self.failed = self.failed.take().or(written.err());
+    }
+
+    fn write(&mut self, sheet: &Sheet<'_>) -> Result<(), Failure> {
         let name = self.free_name(sheet.path);
         let file = format!("{name}.html");
         write_file(&self.directory.join(&file), page::page(sheet, &name)?.as_bytes())?;
         self.entries.push(Entry::of(sheet, name, file)?);
-        self.write_index()
-    }
-
-    /// Says in the index that the run ended at a capture that could not be worked on.
-    pub fn add_failure(&mut self, path: &Path, failure: &Failure) -> Result<(), Failure> {
-        let name = self.free_name(path);
-        self.entries.push(Entry::failed(name, path, failure));
         self.write_index()
     }
 

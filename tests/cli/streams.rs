@@ -95,3 +95,34 @@ fn the_program_itself_survives_a_closed_pipe() {
     assert_eq!(status.unwrap().code(), Some(21));
     resurvey(&["fsck", text(&map)]).ok();
 }
+
+/// Standard output that remembers what had come when it was flushed.
+#[derive(Default)]
+struct Flushed {
+    text: Vec<u8>,
+    at_flush: Vec<String>,
+}
+
+impl Write for Flushed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.text.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.at_flush.push(String::from_utf8_lossy(&self.text).into_owned());
+        Ok(())
+    }
+}
+
+#[test]
+fn a_capture_is_told_before_the_next_one_is_worked_on() {
+    let bench = Bench::with_street();
+    let (map, capture) = (bench.path("map.rsv"), street().path("capture/capture.json"));
+    let quick = ["--set", "semantic.radius_m=2", "--set", "gate.min_score=1"];
+    let words = [&["resurvey", "update", text(&map), text(&capture), text(&capture)], &quick[..]].concat();
+    let mut out = Flushed::default();
+    assert_eq!(resurvey::run(words, &mut out, &mut Vec::new()), 22);
+    let told: Vec<usize> = out.at_flush.iter().map(|text| text.matches("capture.json: unreliable").count()).collect();
+    assert_eq!(told, [1, 2, 2]);
+}
