@@ -85,8 +85,16 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
     bench.run("proposals", &["show", "9"]).refused(11, &["no proposal 9"]);
     bench.run("proposals", &["weigh", "1"]).refused(2, &["[possible values: list, show, accept, reject]"]);
     assert!(bench.run("proposals", &["show", "1"]).ok().out.contains("a shadow"));
-    // Sent again it is not a new one.
-    assert_eq!(update(&bench, &capture(), &["--propose"])["proposals"], json!([1]));
+    // Sent again it is not a new one, and nothing waits.
+    let pose = street().path("pose.json");
+    for words in [&["--propose"][..], &["--confirm", "2"]] {
+        let again = bench.run("update", &[&[&capture(), "--pose", text(&pose), "--json"], words].concat());
+        let document = again.json();
+        assert_eq!((again.code, &document["decision"], &document["proposals"]), (20, &json!("nothing"), &json!([1])));
+        assert_eq!(document["decided"], json!([{"id": 1, "status": "rejected"}]));
+    }
+    let told = bench.run("update", &[&capture(), "--pose", text(&pose), "--propose"]);
+    assert!(told.out.contains("proposal  1, rejected before"), "{}", told.out);
     assert_eq!(bench.json("proposals", &[])["proposals"], json!([]));
     assert_eq!(bench.head(), 1);
 }
@@ -128,6 +136,7 @@ fn a_change_becomes_a_version_when_enough_captures_agree() {
     assert_eq!((&third["decision"], &third["version"]), (&json!("committed"), &json!(2)));
     let banner = bench.json("query", &["--class", "banner"])["features"][0].clone();
     assert_eq!(banner["fid"], third["changes"][0]["fid"]);
+    assert_eq!(third["changes"], bench.json("diff", &["1..2"])["changes"]);
     // The same place three times: as it was, and √3 surer.
     let one = &first["changes"][0]["after"];
     let sigma = |state: &Value| state["sigma_m"].as_f64().unwrap();
