@@ -1,7 +1,9 @@
 //! Change sets (`resurvey.changes/1`, JSON lines) and the JSON form of a descriptor.
 
+use crate::class::ClassId;
 use crate::position::GridPoint;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Value of `format` in the header line.
 pub const FORMAT: &str = "resurvey.changes/1";
@@ -23,6 +25,16 @@ pub struct ChangeSetHeader {
     /// When the world was so, a time with its zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observed_at: Option<String>,
+    /// The map it was made from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map_id: Option<String>,
+    /// Hash of `base_version` in that map, 64 hexadecimal digits: in a map where that version has another one,
+    /// `base_version` says nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_hash: Option<String>,
+    /// Index of each class by name in that map: geometry has indices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub classes: Option<BTreeMap<String, ClassId>>,
 }
 
 /// What an operation does.

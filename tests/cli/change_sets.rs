@@ -93,7 +93,6 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
     let cases: Vec<(String, Vec<&str>)> = vec![
         (String::new(), vec!["line 1", "resurvey.changes/1"]),
         ("a change\n".to_owned(), vec!["line 1"]),
-        (set(Some(1), &[]), vec!["changes nothing"]),
         (set(Some(1), &[]).replace("changes/1", "changes/2"), vec!["resurvey.changes/2"]),
         (set(Some(1), &[]).replace("author", "auther"), vec!["line 1", "unknown field `auther`"]),
         (twice, vec!["feature 1 has two deltas"]),
@@ -129,4 +128,28 @@ fn the_base_that_is_printed_is_the_base_in_the_log() {
     let applied = bench.json("apply", &[&file]);
     assert_eq!((&applied["base_version"], &applied["version"]), (&json!(1), &json!(3)));
     assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["base_version"], applied["base_version"]);
+}
+
+#[test]
+fn a_set_without_an_operation_is_exit_20() {
+    let bench = furnished();
+    let same = bench.run("changes", &["1..1"]).ok().out;
+    for text in [set(Some(1), &[]), set(None, &[]), same] {
+        let file = bench.file("set.jsonl", text);
+        bench.run("apply", &[&file]).refused(20, &["set.jsonl: ", "changes nothing", "after the header"]);
+        let run = bench.run("apply", &[&file, "--json"]);
+        let expected = json!({"decision": "nothing", "base_version": 1, "version": null, "added": 0, "modified": 0,
+            "removed": 0});
+        assert_eq!((run.code, run.json()), (20, expected));
+    }
+    assert_eq!(bench.head(), 1);
+}
+
+#[test]
+fn a_set_without_an_author_is_committed_by_resurvey() {
+    let bench = furnished();
+    let text = set(Some(1), &[json!({"op": "add", "after": chair_at(9.0)})]).replace("\"author\":\"survey\",", "");
+    assert!(!text.contains("author"));
+    bench.json("apply", &[&bench.file("set.jsonl", text)]);
+    assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["author"], "resurvey");
 }

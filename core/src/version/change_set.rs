@@ -6,8 +6,8 @@ use super::{
     descriptor_from_file, descriptor_to_file,
 };
 use jiff::Timestamp;
-use resurvey_schema::ClassTable;
 use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, GeometryLine, ObjectFile, Op};
+use resurvey_schema::{ClassId, ClassTable};
 use std::collections::BTreeMap;
 
 /// A change set that was read and checked.
@@ -21,6 +21,12 @@ pub struct ChangeSet {
     pub message: Option<String>,
     /// When the world was so.
     pub observed_at: Option<Timestamp>,
+    /// The map it was made from.
+    pub map_id: Option<String>,
+    /// Hash of `base` there.
+    pub base_hash: Option<Digest>,
+    /// Names of the classes there, which the indices in `geometries` mean; empty when it does not say.
+    pub classes: BTreeMap<ClassId, String>,
     /// Features without a number.
     pub additions: Vec<FeatureState>,
     /// Changes of numbered features.
@@ -42,6 +48,9 @@ pub enum ChangeSetError {
     /// Not a time.
     #[error("line 1: observed_at: expected a time with its zone such as 2026-03-01T10:00:00+08:00, found {0:?}")]
     ObservedAt(String),
+    /// Not a hash.
+    #[error("line 1: base_hash: expected a SHA-256 of 64 hexadecimal digits, found {0:?}")]
+    BaseHash(String),
     /// Not JSON, or not of the right shape.
     #[error("line {line}: {detail}")]
     Syntax {
@@ -114,11 +123,15 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
         return Err(ChangeSetError::Format(header.format));
     }
     let observed_at = header.observed_at.map(|text| text.parse().map_err(|_| ChangeSetError::ObservedAt(text)));
+    let base_hash = header.base_hash.map(|text| text.parse().map_err(|_| ChangeSetError::BaseHash(text)));
     let mut set = ChangeSet {
         base: header.base_version.map(VersionId),
         author: header.author,
         message: header.message,
         observed_at: observed_at.transpose()?,
+        map_id: header.map_id,
+        base_hash: base_hash.transpose()?,
+        classes: header.classes.into_iter().flatten().map(|(name, index)| (index, name)).collect(),
         additions: Vec::new(),
         deltas: Vec::new(),
         geometries: BTreeMap::new(),
@@ -265,9 +278,29 @@ mod tests {
             author: set.author.clone(),
             message: set.message.clone(),
             observed_at: None,
+            map_id: None,
+            base_hash: None,
+            classes: None,
         };
         let text = write_change_set(&header, &set.deltas, (&classes, &classes), &BTreeMap::new()).unwrap();
         assert_eq!(read_change_set(&text, &ClassTable::default()), Ok(set));
+    }
+
+    #[test]
+    fn a_header_says_of_which_map_its_base_and_its_classes_are() {
+        let hash = Digest::of(b"version 3");
+        let more = format!(r#""map_id":"m","base_hash":"{hash}","classes":{{"glass":1,"stone":0}},"message""#);
+        let text = HEADER.replace("\"message\"", &more);
+        let set = read_change_set(&text, &ClassTable::default()).unwrap();
+        assert_eq!((set.map_id.as_deref(), set.base_hash), (Some("m"), Some(hash)));
+        let names: Vec<_> = set.classes.iter().map(|(index, name)| (index.0, name.as_str())).collect();
+        assert_eq!(names, [(0, "stone"), (1, "glass")]);
+        let header: ChangeSetHeader = serde_json::from_str(&text).unwrap();
+        let classes = ClassTable::default();
+        let written = write_change_set(&header, &[], (&classes, &classes), &BTreeMap::new()).unwrap();
+        assert_eq!(read_change_set(&written, &classes), Ok(set));
+        let wrong = text.replace(&hash.to_string(), "abc");
+        assert_eq!(read_change_set(&wrong, &classes), Err(ChangeSetError::BaseHash("abc".to_owned())));
     }
 
     #[test]
