@@ -109,8 +109,12 @@ impl Shape {
         let text = std::fs::read_to_string(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
         let document: GeoJson = text.parse().map_err(|error| Failure::input(format!("{place}: {error}")))?;
         let rings = match geometry(document) {
-            Some(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
-            _ => return Err(Failure::input(format!("{place}: expected one GeoJSON polygon"))),
+            Ok(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
+            other => {
+                let found =
+                    other.map_or_else(|found| found, |geometry| format!("a {} without rings", geometry.type_name()));
+                return Err(Failure::input(format!("{place}: expected one GeoJSON polygon, found {found}")));
+            }
         };
         let mut lines = Vec::new();
         for ring in rings {
@@ -171,14 +175,19 @@ impl Shape {
     }
 }
 
-fn geometry(document: GeoJson) -> Option<Geometry> {
+/// The one polygon in a document, or what is there instead.
+fn geometry(document: GeoJson) -> Result<Geometry, String> {
+    let of = |geometry: Option<geojson::Geometry>| match geometry.map(|geometry| geometry.value) {
+        Some(polygon @ Geometry::Polygon(_)) => Ok(polygon),
+        Some(other) => Err(format!("a {}", other.type_name())),
+        None => Err("a feature without a geometry".to_owned()),
+    };
     match document {
-        GeoJson::Geometry(geometry) => Some(geometry.value),
-        GeoJson::Feature(feature) => feature.geometry.map(|geometry| geometry.value),
-        GeoJson::FeatureCollection(collection) => {
-            let mut features = collection.features.into_iter();
-            let only = features.next()?;
-            if features.next().is_some() { None } else { only.geometry.map(|geometry| geometry.value) }
-        }
+        GeoJson::Geometry(geometry) => of(Some(geometry)),
+        GeoJson::Feature(feature) => of(feature.geometry),
+        GeoJson::FeatureCollection(mut collection) => match collection.features.len() {
+            1 => of(collection.features.remove(0).geometry),
+            count => Err(format!("a collection of {count} features")),
+        },
     }
 }

@@ -128,6 +128,15 @@ fn a_polygon_file_that_is_none_is_exit_10() {
         let file = bench.file("region.geojson", contents);
         bench.refuses("query", &["--polygon", &file], 10, &["region.geojson"]);
     }
+    for (contents, found) in [
+        (r#"{"type":"Point","coordinates":[835600,817800]}"#, "found a Point"),
+        (r#"{"type":"Polygon","coordinates":[]}"#, "found a Polygon without rings"),
+        (r#"{"type":"FeatureCollection","features":[]}"#, "found a collection of 0 features"),
+        (r#"{"type":"Feature","properties":null,"geometry":null}"#, "found a feature without a geometry"),
+    ] {
+        let file = bench.file("region.geojson", contents);
+        bench.refuses("query", &["--polygon", &file], 10, &["expected one GeoJSON polygon", found]);
+    }
     let swapped =
         bench.file("region.geojson", r#"{"type":"Polygon","coordinates":[[[22,114],[23,114],[23,115],[22,114]]]}"#);
     bench.refuses("query", &["--polygon", &swapped, "--wgs84"], 10, &["region.geojson"]);

@@ -81,7 +81,8 @@ fn a_before_that_is_not_what_the_map_has_is_exit_21() {
 #[test]
 fn a_base_that_the_map_never_had_is_exit_11() {
     let bench = furnished();
-    refuses(&bench, &set(Some(7), &[json!({"op": "add", "after": chair()})]), 11, &["no version 7", "newest is 1"]);
+    let words = ["set.jsonl: base_version: no version 7; the newest is 1", "null applies to any version"];
+    refuses(&bench, &set(Some(7), &[json!({"op": "add", "after": chair()})]), 11, &words);
 }
 
 #[test]
@@ -95,7 +96,7 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
         ("a change\n".to_owned(), vec!["line 1"]),
         (set(Some(1), &[]).replace("changes/1", "changes/2"), vec!["resurvey.changes/2"]),
         (set(Some(1), &[]).replace("author", "auther"), vec!["line 1", "unknown field `auther`"]),
-        (twice, vec!["feature 1 has two deltas"]),
+        (twice, vec!["line 3: feature 1 has two deltas, the first in line 2"]),
         (add(json!({"class": "sofa", "position": CHAIR})), vec!["line 2, after", "\"sofa\"", "expected one of stone"]),
         (add(json!({"class": "sky", "position": CHAIR})), vec!["line 2, after", "sky"]),
         (add(serde_json::from_str(&skewed).unwrap()), vec!["line 2, after", "corner 0"]),
@@ -108,7 +109,7 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
         (set(Some(1), &[json!({"op": "add", "fid": 0, "after": chair()})]), vec!["line 2", "fid 0"]),
         (
             set(Some(1), &[json!({"op": "modify", "fid": 1, "before": chair(), "after": chair()})]),
-            vec!["feature 1 changes nothing"],
+            vec!["line 2: feature 1 changes nothing"],
         ),
     ];
     for (text, words) in cases {

@@ -78,8 +78,8 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
     update(&bench, &capture(), &["--propose"]);
     assert_eq!(bench.run("proposals", &["reject", "1", "--note", "a shadow"]).ok().out, "proposal 1 is rejected\n");
     for action in ["accept", "reject"] {
-        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already"]);
-        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9"]);
+        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already", "MAP show 1"]);
+        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9", "list --all"]);
         bench.run("proposals", &[action]).refused(2, &["the number of a proposal"]);
     }
     bench.run("proposals", &["show", "9"]).refused(11, &["no proposal 9"]);

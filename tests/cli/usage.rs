@@ -57,12 +57,13 @@ fn a_place_that_is_not_on_the_map_is_refused_with_its_numbers() {
 fn names_that_nothing_has_are_exit_11_and_the_known_ones_are_listed() {
     let bench = Bench::with_street();
     bench.refuses("query", &["--at", "99"], 11, &["no version 99; the newest is 1"]);
-    bench.refuses("query", &["--at", "spring"], 11, &["no tag \"spring\""]);
+    bench.refuses("query", &["--at", "spring"], 11, &["no tag \"spring\"", "resurvey tag MAP"]);
+    bench.refuses("query", &["--at", "2026-03-01"], 11, &["no tag \"2026-03-01\"", "@2026-03-01"]);
     bench.refuses("query", &["--at", "@1999-12-31"], 11, &["no version at 1999-12-31"]);
     bench.refuses("query", &["--at", "@yesterday"], 2, &["@2026-03-01"]);
     bench.refuses("query", &["--at", "a b"], 2, &["expected a version number, a tag, head, or @DATE"]);
     bench.refuses("query", &["--class", "marble"], 11, &["no class \"marble\"", "stone, glass, metal, banner"]);
-    bench.refuses("why", &["4000000"], 11, &["no feature 4000000"]);
+    bench.refuses("why", &["4000000"], 11, &["no feature 4000000", "resurvey query MAP"]);
     bench.refuses("log", &["4000000"], 11, &["no feature 4000000"]);
     bench.refuses("why", &["0"], 11, &["no feature 0"]);
     let capture = street().path("capture/capture.json");

@@ -69,6 +69,24 @@ pub enum ChangeSetError {
         /// The keys it needs.
         needs: &'static str,
     },
+    /// A second delta of a feature.
+    #[error("line {line}: feature {fid} has two deltas, the first in line {first}; expected one at most")]
+    Twice {
+        /// Counted from 1.
+        line: usize,
+        /// The feature.
+        fid: Fid,
+        /// Line of its first one.
+        first: usize,
+    },
+    /// A delta whose sides are the same.
+    #[error("line {line}: feature {fid} changes nothing; expected an \"after\" that differs from \"before\"")]
+    NoChange {
+        /// Counted from 1.
+        line: usize,
+        /// The feature.
+        fid: Fid,
+    },
     /// A feature number that no map gives.
     #[error("line {line}: fid {fid} is not between 1 and {}", Fid::MAX)]
     Fid {
@@ -115,9 +133,7 @@ impl ChangeSet {
 pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, ChangeSetError> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let (number, first) = lines.next().ok_or(ChangeSetError::Empty)?;
-    let syntax = |number: usize| {
-        move |error: serde_json::Error| ChangeSetError::Syntax { line: number + 1, detail: error.to_string() }
-    };
+    let syntax = |number: usize| move |error: serde_json::Error| syntax_error(number + 1, &error);
     let header: ChangeSetHeader = serde_json::from_str(first).map_err(syntax(number))?;
     if header.format != FORMAT {
         return Err(ChangeSetError::Format(header.format));
@@ -136,6 +152,7 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
         deltas: Vec::new(),
         geometries: BTreeMap::new(),
     };
+    let mut first_lines = BTreeMap::new();
     for (number, line) in lines {
         if is_geometry(line) {
             let geometry: GeometryLine = serde_json::from_str(line).map_err(syntax(number))?;
@@ -143,9 +160,30 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
             continue;
         }
         let change: ChangeLine = serde_json::from_str(line).map_err(syntax(number))?;
+        let deltas = set.deltas.len();
         read_line(&change, number + 1, classes, &mut set)?;
+        if let Some(delta) = set.deltas.get(deltas) {
+            check_delta(delta, number + 1, &mut first_lines)?;
+        }
     }
     Ok(set)
+}
+
+/// What the parser says of a line; to it every line is the first.
+fn syntax_error(line: usize, error: &serde_json::Error) -> ChangeSetError {
+    let (text, column) = (error.to_string(), error.column());
+    let what = text.strip_suffix(&format!(" at line {} column {column}", error.line()));
+    let detail = what.map_or_else(|| text.clone(), |what| format!("{what} (column {column})"));
+    ChangeSetError::Syntax { line, detail }
+}
+
+/// Refuses a delta that changes nothing, and a second one of a feature.
+fn check_delta(delta: &Delta, line: usize, first_lines: &mut BTreeMap<Fid, usize>) -> Result<(), ChangeSetError> {
+    let fid = delta.fid();
+    if delta.before() == delta.after() {
+        return Err(ChangeSetError::NoChange { line, fid });
+    }
+    first_lines.insert(fid, line).map_or(Ok(()), |first| Err(ChangeSetError::Twice { line, fid, first }))
 }
 
 fn read_line(
@@ -355,7 +393,17 @@ mod tests {
                 &format!("\n{{\"op\":\"add\",\"after\":{}}}", CHAIR.replace("chair", "sofa")),
                 "line 3, after: class \"sofa\"",
             ),
-            ("{", "line 2: EOF"),
+            ("{", "line 2: EOF while parsing an object (column 1)"),
+            (
+                &format!(
+                    "{{\"op\":\"add\",\"fid\":7,\"after\":{CHAIR}}}\n\n{{\"op\":\"remove\",\"fid\":7,\"before\":{CHAIR}}}"
+                ),
+                "line 4: feature 7 has two deltas, the first in line 2",
+            ),
+            (
+                &format!("{{\"op\":\"modify\",\"fid\":7,\"before\":{CHAIR},\"after\":{CHAIR}}}"),
+                "line 2: feature 7 changes nothing",
+            ),
         ] {
             let found = read(lines).unwrap_err().to_string();
             assert!(found.starts_with(expected), "{lines}\nexpected {expected}\nfound {found}");
