@@ -59,6 +59,20 @@ impl Failure {
         Self::new(INPUT, anyhow::anyhow!("{text}"))
     }
 
+    /// A conflict with more `words`, and more keys of each feature in the list.
+    pub fn conflict(error: &CommitError, words: &str, states: Vec<Value>) -> Self {
+        let next = "look at the features with \"resurvey query\" and work the change out again";
+        let failure = Self::new(CONFLICT, anyhow::anyhow!("{error}{words}; {next}"));
+        let CommitError::Conflict { base, head, changed, looked_at } = error else { return failure };
+        let mut document = conflict(*base, *head, changed, looked_at);
+        for (index, state) in states.into_iter().enumerate() {
+            if let (Some(change), Value::Object(state)) = (document["conflicts"][index].as_object_mut(), state) {
+                change.extend(state);
+            }
+        }
+        failure.with_document(document)
+    }
+
     /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
@@ -188,11 +202,7 @@ impl From<StoreError> for Failure {
 impl From<CommitError> for Failure {
     fn from(error: CommitError) -> Self {
         match error {
-            CommitError::Conflict { base, head, ref changed, ref looked_at } => {
-                let next = "look at the features with \"resurvey query\" and work the change out again";
-                let document = conflict(base, head, changed, looked_at);
-                Self::new(CONFLICT, anyhow::anyhow!("{error}; {next}")).with_document(document)
-            }
+            CommitError::Conflict { .. } => Self::conflict(&error, "", Vec::new()),
             CommitError::NothingToRevert { version, .. } => Self::new(NOTHING, error).with_document(json!({
                 "decision": "nothing", "reverts": version.0, "version": null, "added": 0, "modified": 0, "removed": 0,
             })),

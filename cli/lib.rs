@@ -3,6 +3,7 @@
 
 mod args;
 mod commands;
+mod conflict;
 mod console;
 mod document;
 mod failure;

@@ -1,6 +1,7 @@
 //! `resurvey apply`.
 
 use crate::args::Apply;
+use crate::conflict::refused;
 use crate::console::Console;
 use crate::failure::{Failure, NOTHING};
 use jiff::Timestamp;
@@ -41,7 +42,7 @@ pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
         return Err(about(of_nothing(transaction.base)));
     }
     let committed = map.commit(&transaction, Timestamp::now());
-    let version = committed.map_err(|error| about(error.into()))?;
+    let version = committed.map_err(|error| about(refused(error, &map, &transaction.deltas)))?;
     console.did(format_args!("version {version} was committed"));
     let record = map.version(version)?;
     let counts = record.counts;

@@ -115,7 +115,7 @@ pub(super) fn op(delta: &Delta) -> &'static str {
 }
 
 /// What and where something is, in one line.
-pub(super) fn words(state: &FeatureState, classes: &ClassTable) -> String {
+pub(crate) fn words(state: &FeatureState, classes: &ClassTable) -> String {
     match state {
         FeatureState::Descriptor(descriptor) => {
             let at = descriptor.anchor();

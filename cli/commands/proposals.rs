@@ -3,6 +3,7 @@
 use super::diff::Sides;
 use crate::args::{ProposalAction, Proposals};
 use crate::commands::evidence;
+use crate::conflict::refused;
 use crate::console::Console;
 use crate::failure::{CONFLICT, Failure, conflict};
 use comfy_table::{Table, presets};
@@ -101,7 +102,8 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
         refuse_what_is_there(&map, &proposal)?;
     }
     let accepted = map.accept(id, &options.by, &options.note, Timestamp::now());
-    let version = accepted.map_err(|error| of_proposal(error.into(), &proposal))?;
+    let version =
+        accepted.map_err(|error| of_proposal(refused(error, &map, &proposal.transaction.deltas), &proposal))?;
     console.did(format_args!("proposal {id} was accepted as version {version}"));
     if console.is_json() {
         console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;

@@ -2,12 +2,13 @@
 
 use super::crs_of;
 use crate::args::Revert;
+use crate::conflict::refused;
 use crate::console::Console;
 use crate::failure::{Failure, NOTHING};
 use crate::region;
 use jiff::Timestamp;
 use resurvey_core::store::{self, History, MapFile};
-use resurvey_core::version::{PluginBuild, VersionId};
+use resurvey_core::version::{Delta, PluginBuild, VersionId};
 use serde_json::{Value, json};
 
 /// Undoes one version by a new one, or all that a plugin build did by one for each.
@@ -24,7 +25,8 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
         (Some(build), _) => all_of(&map, build, &wish, console),
         (None, Some(revision)) => {
             wish.version = map.resolve(revision)?;
-            let version = map.revert(&wish, Timestamp::now())?;
+            let reverted = map.revert(&wish, Timestamp::now());
+            let version = reverted.map_err(|error| refused(error, &map, &undoing(&map, wish.version)))?;
             console.did(format_args!("version {version} was committed"));
             let document = undone(&map, wish.version, version)?;
             if console.is_json() {
@@ -38,9 +40,14 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
 }
 
+/// What an undo of `version` changes, for telling why it was refused.
+fn undoing(map: &MapFile, version: VersionId) -> Vec<Delta> {
+    map.changes_of(version).unwrap_or_default().into_iter().map(Delta::undone).collect()
+}
+
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let versions = map.versions_by(build)?;
-    let done = map.revert_all(&versions, wish, Timestamp::now())?;
+    let done = map.revert_all(&versions, wish, Timestamp::now()).map_err(|error| refused(error, map, &[]))?;
     done.iter().for_each(|(_, version)| console.did(format_args!("version {version} was committed")));
     let documents =
         done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;

@@ -3,6 +3,7 @@
 
 use super::diff::Sides;
 use super::update::{Committed, Outcome, Run, message_of};
+use crate::conflict::refused;
 use crate::failure::Failure;
 use jiff::Timestamp;
 use resurvey_core::capture::Capture;
@@ -73,7 +74,8 @@ impl Run<'_> {
         }
         transaction.evidence = Some(Observation { decision: Decision::Committed, confirmations, ..evidence });
         let closed: Vec<u64> = closed.into_iter().collect();
-        let version = self.map.confirm(&closed, &transaction, &note, now)?;
+        let confirmed = self.map.confirm(&closed, &transaction, &note, now);
+        let version = confirmed.map_err(|error| refused(error, self.map, &transaction.deltas))?;
         let did = self.map.changes_of(version)?;
         let added: Vec<u64> = did.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
         // Where only some were confirmed, numbers cannot be told apart.

@@ -6,6 +6,7 @@ mod told;
 use super::crs_of;
 use crate::args::{PluginSearch, PriorFrom, Update};
 use crate::commands::review::{Review, repeated};
+use crate::conflict::refused;
 use crate::console::{Console, Stage};
 use crate::failure::Failure;
 use crate::matching::MatchingTool;
@@ -357,7 +358,8 @@ impl Run<'_> {
         transaction.evidence = Some(evidence);
         transaction.idempotency_key = self.recording.idempotency_key.map(ToOwned::to_owned);
         add_changes(&mut transaction, &outcome.resolution.changes);
-        let version = self.map.commit(&transaction, now)?;
+        let committed = self.map.commit(&transaction, now);
+        let version = committed.map_err(|error| refused(error, self.map, &transaction.deltas))?;
         let changes = self.map.changes_of(version)?;
         let fids = changes.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
         Ok(Committed { version: Some(version), fids, ..Committed::nothing(decision) })

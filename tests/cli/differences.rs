@@ -9,6 +9,13 @@ pub fn chair_at(east: f64) -> Value {
     serde_json::from_str(&edited(&chair(), |chair| chair["position"][0] = json!(CHAIR[0] + east))).unwrap()
 }
 
+/// The same chair as answers have it.
+pub fn chair_state(east: f64) -> Value {
+    let mut state = chair_at(east);
+    state["size_m"] = json!([0.5, 0.5, 0.9]);
+    state
+}
+
 /// A chair (1) and a banner (2) as version 1; the chair moves 1 m east, the banner goes and a chair (3) 50 m east comes
 /// as version 2.
 pub fn changed() -> Bench {

@@ -2,7 +2,7 @@
 
 use crate::bench::Bench;
 use crate::change_sets::CHAIR;
-use crate::differences::{chair_at, changed};
+use crate::differences::{chair_at, chair_state, changed};
 use serde_json::{Value, json};
 
 #[test]
@@ -33,7 +33,10 @@ fn an_undo_of_what_changed_later_is_exit_21_with_a_list() {
     let document = run.json();
     let keys: Vec<&String> = document.as_object().unwrap().keys().collect();
     assert_eq!(keys, ["decision", "base_version", "head", "version", "conflicts", "looked_at_by"]);
-    assert_eq!(document["conflicts"], json!([{"fid": 1, "changed_in": 3, "is_on_map": true, "is_target": true}]));
+    let (found, expected) = (chair_state(2.0), chair_state(1.0));
+    let one =
+        json!({"fid": 1, "changed_in": 3, "is_on_map": true, "is_target": true, "found": found, "expected": expected});
+    assert_eq!(document["conflicts"], json!([one]));
     assert_eq!((&document["decision"], &document["version"]), (&json!("conflict"), &Value::Null));
     assert_eq!(bench.head(), 3);
     // Where nothing changed since, it can be undone.
