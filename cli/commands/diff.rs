@@ -95,7 +95,6 @@ impl Sides<'_> {
             properties.insert("fid".to_owned(), json!(delta.fid().0));
             properties.insert("op".to_owned(), json!(op(delta)));
             properties.insert("side".to_owned(), json!(side));
-            properties.insert("kind".to_owned(), json!(state.kind_name()));
             properties.extend(document::state(state, classes)?);
             let geometry = region::geojson(crs, state)?;
             let id = format!("{}:{side}", delta.fid());

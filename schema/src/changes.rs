@@ -2,6 +2,7 @@
 
 use crate::class::ClassId;
 use crate::position::GridPoint;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -97,10 +98,14 @@ pub struct ObjectFile {
 }
 
 /// A descriptor as JSON has it: material when `corners` is there, dynamic when `position` is. Derived values (`centre`,
-/// `width_m`, `height_m`, `area_m2`) are written for readers and ignored when read.
+/// `width_m`, `height_m`, `area_m2`) are written for readers and ignored when read; so is the `kind` of a state that an
+/// answer printed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DescriptorFile {
+    /// `material` or `dynamic`, which the other keys say too.
+    #[serde(default, skip_serializing)]
+    pub kind: Option<IgnoredAny>,
     /// Class name.
     pub class: String,
     /// Bottom-left, bottom-right, top-right, top-left, seen from outside.

@@ -253,3 +253,20 @@ fn init_and_import_say_what_they_made() {
     assert_eq!((&log["versions"][0]["message"], &log["versions"][0]["version"]), (&json!("survey 2026"), &json!(2)));
     assert_eq!(bench.head(), 2);
 }
+
+#[test]
+fn a_state_has_its_kind_in_every_answer_and_may_be_sent_back() {
+    let (bench, document) = Bench::with_banner();
+    let fid = document["changes"][0]["fid"].to_string();
+    let diff = bench.json("diff", &["1..2"])["changes"][0]["after"].clone();
+    let why = bench.json("why", &[&fid])["steps"][0]["after"].clone();
+    assert_eq!((&diff["kind"], &why, &document["changes"][0]["after"]), (&json!("material"), &diff, &diff));
+    let object = bench.json("diff", &["0..1"])["changes"][0]["after"].clone();
+    assert_eq!(object["kind"], "object");
+    let before = crate::change_sets::set(
+        Some(2),
+        &[json!({"op": "remove", "fid": document["changes"][0]["fid"], "before": diff})],
+    );
+    bench.run("apply", &[&bench.file("set.jsonl", before)]).ok();
+    assert_eq!(bench.head(), 3);
+}

@@ -13,6 +13,7 @@ pub fn chair_at(east: f64) -> Value {
 pub fn chair_state(east: f64) -> Value {
     let mut state = chair_at(east);
     state["size_m"] = json!([0.5, 0.5, 0.9]);
+    state["kind"] = json!("dynamic");
     state
 }
 
