@@ -9,6 +9,7 @@ mod document;
 mod failure;
 mod matching;
 mod output;
+mod plain;
 mod prior;
 mod region;
 mod report;
@@ -24,6 +25,7 @@ use commands::{
 use console::Console;
 use failure::{Failure, INPUT, USAGE};
 use output::Output;
+use plain::plain_lines;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -76,7 +78,7 @@ fn tell(mut failure: Failure, console: &mut Console<'_>) -> Failure {
 /// closed standard error is nobody's loss.
 fn exit_code(result: Result<u8, Failure>, done: &[String], output: Output<'_>, err: &mut dyn Write) -> u8 {
     let code = result.unwrap_or_else(|failure| {
-        let _ = writeln!(err, "resurvey: {failure}");
+        let _ = writeln!(err, "resurvey: {}", plain_lines(&failure.to_string()));
         failure.code()
     });
     let Err(error) = output.finish() else { return code };

@@ -23,7 +23,7 @@ pub struct Diff {
 /// Form of a difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DiffFormat {
-    /// ++ came, -- went, - and + the old and the new value of what changed
+    /// ++ came, -- went, ~~ changed: - and + are the old and the new value
     Text,
     /// One JSON document
     Json,

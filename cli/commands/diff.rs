@@ -5,6 +5,7 @@ use crate::args::{Diff, DiffFormat};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use crate::region;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{History, MapFile};
@@ -60,7 +61,8 @@ impl Sides<'_> {
         Ok(json!({ "op": op(delta), "fid": delta.fid().0, "class": class, "before": before, "after": after }))
     }
 
-    /// `++` and `--` for what came and went, `-` and `+` for every value that changed.
+    /// `++` and `--` for what came and went; for what changed `~~` with what it is now, and `-` and `+` for every value that
+    /// is another.
     pub(super) fn text(&self, delta: &Delta, console: &mut Console<'_>) -> Result<(), Failure> {
         // Number 0 stands for one that the map has not given yet.
         let fid = if delta.fid() == Fid(0) { "new".to_owned() } else { delta.fid().to_string() };
@@ -68,6 +70,7 @@ impl Sides<'_> {
             (None, Some(after)) => console.line(format_args!("++ {fid} {}", words(after, self.after)))?,
             (Some(before), None) => console.line(format_args!("-- {fid} {}", words(before, self.before)))?,
             (Some(before), Some(after)) => {
+                console.line(format_args!("~~ {fid} {}", words(after, self.after)))?;
                 let (old, new) = (document::state(before, self.before)?, document::state(after, self.after)?);
                 for key in new.keys().chain(old.keys().filter(|key| !new.contains_key(*key))) {
                     let (old, new) = (old.get(key), new.get(key));
@@ -76,7 +79,7 @@ impl Sides<'_> {
                     }
                     for (sign, value) in [('-', old), ('+', new)] {
                         if let Some(value) = value {
-                            console.line(format_args!("{sign} {fid} {key} = {value}"))?;
+                            console.line(format_args!("{sign} {fid} {key} = {}", plain(&value.to_string())))?;
                         }
                     }
                 }
@@ -118,7 +121,7 @@ pub(crate) fn words(state: &FeatureState, classes: &ClassTable) -> String {
     match state {
         FeatureState::Descriptor(descriptor) => {
             let at = descriptor.anchor();
-            let class = classes.name(descriptor.class());
+            let class = plain(classes.name(descriptor.class()));
             let size = match descriptor {
                 Descriptor::Material(_) => {
                     let file = resurvey_core::version::descriptor_to_file(descriptor, classes);

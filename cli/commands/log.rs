@@ -5,6 +5,7 @@ use crate::args::Log;
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use crate::region;
 use comfy_table::{Table, presets};
 use resurvey_core::store::{History, MapFile};
@@ -46,11 +47,11 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
             record.version.to_string(),
             record.kind.name().to_owned(),
             record.committed_at.to_string(),
-            record.author.clone(),
+            plain(&record.author).into_owned(),
             record.counts.added.to_string(),
             record.counts.modified.to_string(),
             record.counts.removed.to_string(),
-            record.message.clone(),
+            plain(&record.message).into_owned(),
         ]);
     }
     console.line(table.trim_fmt())?;

@@ -6,6 +6,7 @@ use crate::commands::evidence;
 use crate::conflict::refused;
 use crate::console::Console;
 use crate::failure::{CONFLICT, Failure, conflict};
+use crate::plain::plain;
 use comfy_table::{Table, presets};
 use jiff::Timestamp;
 use resurvey_core::store::{
@@ -58,7 +59,7 @@ fn list(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
             proposal.id.to_string(),
             status(proposal).to_owned(),
             proposal.proposed_at.to_string(),
-            proposal.transaction.author.clone(),
+            plain(&proposal.transaction.author).into_owned(),
             changes.join("; "),
         ]);
     }
@@ -78,11 +79,13 @@ fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure
         console.document(&document)?;
         return Ok(0);
     }
-    console.line(format_args!("proposal {id}: {}, by {}", status(&proposal), proposal.transaction.author))?;
-    console.line(format_args!("  message   {}", proposal.transaction.message))?;
+    let (author, message) = (plain(&proposal.transaction.author), plain(&proposal.transaction.message));
+    console.line(format_args!("proposal {id}: {}, by {author}", status(&proposal)))?;
+    console.line(format_args!("  message   {message}"))?;
     console.line(format_args!("  base      version {}", proposal.transaction.base))?;
     if let Some(decision) = &proposal.decision {
-        console.line(format_args!("  decided   {} by {}: {}", decision.at, decision.by, decision.note))?;
+        let (by, note) = (plain(&decision.by), plain(&decision.note));
+        console.line(format_args!("  decided   {} by {by}: {note}", decision.at))?;
     }
     let sides = Sides { before: classes, after: classes };
     for delta in deltas(&proposal) {

@@ -5,6 +5,7 @@ use crate::args::{Query, QueryFormat};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, MISSING};
+use crate::plain::plain;
 use crate::region::{self, Shape};
 use comfy_table::{Table, presets};
 use resurvey_core::crs::Crs;
@@ -149,7 +150,7 @@ impl Answer<'_> {
             table.add_row([
                 feature.fid.to_string(),
                 feature.state.kind_name().to_owned(),
-                self.class(feature).to_owned(),
+                plain(self.class(feature)).into_owned(),
                 format!("{east:.digits$}"),
                 format!("{north:.digits$}"),
                 format!("{height:.2}"),

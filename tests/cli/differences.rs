@@ -40,14 +40,16 @@ fn around(east: f64) -> String {
 fn a_difference_is_told_by_signs_with_old_and_new_values() {
     let bench = changed();
     let run = bench.run("diff", &["1..2"]).ok();
-    let expected = "- 1 position = [835600.0,817800.0,4.5]\n\
+    let expected = "~~ 1 chair at E 835601.00 N 817800.00 H 4.50\n\
+        - 1 position = [835600.0,817800.0,4.5]\n\
         + 1 position = [835601.0,817800.0,4.5]\n\
         -- 2 banner at E 835600.00 N 817801.00 H 5.00, 2.00 x 1.00 m\n\
         ++ 3 chair at E 835650.00 N 817800.00 H 4.50\n";
     assert_eq!(run.out, expected);
     assert_eq!(run.err, "3 features differ between version 1 and version 2\n");
     let back = bench.run("diff", &["2..1"]).ok().out;
-    let expected = "- 1 position = [835601.0,817800.0,4.5]\n\
+    let expected = "~~ 1 chair at E 835600.00 N 817800.00 H 4.50\n\
+        - 1 position = [835601.0,817800.0,4.5]\n\
         + 1 position = [835600.0,817800.0,4.5]\n\
         ++ 2 banner at E 835600.00 N 817801.00 H 5.00, 2.00 x 1.00 m\n\
         -- 3 chair at E 835650.00 N 817800.00 H 4.50\n";
@@ -317,4 +319,24 @@ fn geometry_is_refused_where_its_classes_have_other_names() {
         let made = "where the set was made";
         resurvey(&["apply", text(&map), &set]).refused(10, &["set.jsonl: geometry ", "class ", made, word]);
     }
+}
+
+#[test]
+fn texts_of_others_neither_break_lines_nor_steer_the_terminal() {
+    let bench = furnished();
+    let evil = "a\nb\u{1b}[2J";
+    let mut header = json!({"format": "resurvey.changes/1", "base_version": null, "author": evil, "message": evil});
+    header["observed_at"] = json!("2026-03-01T00:00:00Z");
+    let line = json!({"op": "add", "after": chair_at(10.0)});
+    bench.json("apply", &[&bench.file("set.jsonl", format!("{header}\n{line}\n"))]);
+    for (command, words) in [("log", &[][..]), ("why", &["3"])] {
+        let out = bench.run(command, words).ok().out;
+        assert!(out.contains("a\\nb\\u{1b}[2J") && !out.contains('\u{1b}'), "{out:?}");
+    }
+    assert_eq!(bench.run("log", &[]).ok().out.lines().count(), 4);
+    // Machines get what is there.
+    assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["message"], evil);
+    bench.run("query", &["--at", "a\u{1b}b"]).refused(2, &["\\u{1b}"]);
+    let nowhere = bench.run("apply", &["/no\u{1b}where"]);
+    assert!(nowhere.err.contains("/no\\u{1b}where") && !nowhere.err.contains('\u{1b}'), "{:?}", nowhere.err);
 }

@@ -6,6 +6,7 @@ use crate::commands::localize::pose_text;
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, NOTHING, UNRELIABLE};
+use crate::plain::plain;
 use resurvey_core::plugin::PluginInfo;
 use resurvey_core::store::History;
 use resurvey_core::update::Change;
@@ -100,16 +101,17 @@ pub(super) fn summary(
     }
     console.line(format_args!("  pose      {}", pose_text(&outcome.located.localization.pose)))?;
     for reason in &outcome.located.reasons {
-        console.line(format_args!("  doubt     {reason}"))?;
+        console.line(format_args!("  doubt     {}", plain(reason)))?;
     }
     for change in document["changes"].as_array().into_iter().flatten() {
-        let (op, class) = (change["op"].as_str().unwrap_or_default(), change["class"].as_str().unwrap_or_default());
+        let (op, class) =
+            (change["op"].as_str().unwrap_or_default(), plain(change["class"].as_str().unwrap_or_default()));
         let fid = change["fid"].as_u64().map_or_else(String::new, |fid| format!(" {fid}"));
         let state = if change["after"].is_null() { &change["before"] } else { &change["after"] };
         console.line(format_args!("  {op:9} {class}{fid} {}", place(state)))?;
     }
     for rejection in document["rejections"].as_array().into_iter().flatten() {
-        let text = |key: &str| rejection[key].as_str().unwrap_or_default().to_owned();
+        let text = |key: &str| plain(rejection[key].as_str().unwrap_or_default());
         let number = |key: &str| rejection[key].as_f64().unwrap_or_default();
         console.line(format_args!(
             "  rejected  {} -> {}, {} px: {} is {:.3} {}, limit {:.3}",
