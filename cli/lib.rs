@@ -8,6 +8,7 @@ mod console;
 mod document;
 mod failure;
 mod matching;
+mod out_file;
 mod output;
 mod plain;
 mod prior;

@@ -26,7 +26,6 @@ pub mod update;
 use crate::failure::Failure;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{MapFile, StoreError};
-use std::path::Path;
 
 /// The map's coordinate reference system.
 fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
@@ -34,15 +33,6 @@ fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
     frame.crs.parse().map_err(|error: resurvey_core::crs::CrsError| {
         StoreError::Damaged { path: map.path().to_owned(), detail: error.to_string() }.into()
     })
-}
-
-/// Writes a file that the user named, over one that is there unless that is a map.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    if MapFile::open_read_only(path).is_ok() {
-        let text = format!("{}: expected a file to write, found a map, which nothing writes over", path.display());
-        return Err(Failure::input(text));
-    }
-    std::fs::write(path, bytes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }
 
 /// A CSV cell, quoted where it must be (RFC 4180).

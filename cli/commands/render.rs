@@ -1,9 +1,10 @@
 //! `resurvey render`.
 
-use super::{crs_of, write_file};
+use super::crs_of;
 use crate::args::Render;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::out_file::write_file;
 use crate::prior::{Placed, read_placed};
 use resurvey_core::camera::Camera;
 use resurvey_core::capture::read_pose;

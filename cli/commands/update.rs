@@ -10,6 +10,7 @@ use crate::conflict::refused;
 use crate::console::{Console, Stage};
 use crate::failure::Failure;
 use crate::matching::MatchingTool;
+use crate::out_file::delivered;
 use crate::prior::{Placed, read_placed};
 use crate::report::{Reports, Seen, Sheet};
 use crate::segment::Segmenting;
@@ -71,12 +72,11 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
         }
     }
     let written = reports.map_or(Ok(()), Reports::finish);
-    match (tally.code(), written) {
-        // The map has what was committed, and the result is told: a page is all that is missing.
-        (Ok(0), Err(failure)) => Err(failure),
-        (code, written) => {
-            written.unwrap_or_else(|failure| console.message(&format!("resurvey: {failure}")));
-            code
+    match tally.code() {
+        Ok(code) => delivered(code, written, console),
+        Err(failure) => {
+            delivered(failure.code(), written, console)?;
+            Err(failure)
         }
     }
 }

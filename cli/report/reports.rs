@@ -2,9 +2,10 @@
 
 use super::index::{self, Entry};
 use super::page;
+use super::section::GENERATED;
 use super::sheet::Sheet;
-use crate::commands::write_file;
 use crate::failure::Failure;
+use crate::out_file::write_file;
 use std::path::{Path, PathBuf};
 
 /// The reports of one run.
@@ -22,6 +23,7 @@ impl Reports {
     pub fn start(directory: &Path) -> Result<Self, Failure> {
         let wrong = |error: std::io::Error| Failure::input(format!("{}: {error}", directory.display()));
         std::fs::create_dir_all(directory).map_err(wrong)?;
+        refuse_others(&directory.join("index.html"))?;
         let mut reports = Self {
             directory: directory.to_owned(),
             taken: vec!["index".to_owned()],
@@ -76,6 +78,17 @@ impl Reports {
         let name = std::iter::once(wanted.clone()).chain(numbered).find(is_free).unwrap_or(wanted);
         self.taken.push(name.to_lowercase());
         name
+    }
+}
+
+/// Refuses to write over a page that is not one of these.
+fn refuse_others(index: &Path) -> Result<(), Failure> {
+    match std::fs::read(index) {
+        Ok(page) if !String::from_utf8_lossy(&page).contains(GENERATED) => Err(Failure::input(format!(
+            "{}: expected a directory for reports, found a page of somebody else; name a directory of its own",
+            index.display()
+        ))),
+        _ => Ok(()),
     }
 }
 

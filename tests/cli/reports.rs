@@ -156,3 +156,14 @@ fn a_page_that_cannot_be_written_hides_no_version() {
     assert_eq!((again.code, &again.json()["decision"]), (20, &json!("nothing")));
     assert!(again.err.contains("0042.html: "), "{}", again.err);
 }
+
+#[test]
+fn a_page_of_somebody_else_is_not_written_over() {
+    let bench = Bench::with_street();
+    std::fs::create_dir_all(bench.path("reports")).unwrap();
+    std::fs::write(bench.path("reports/index.html"), "<title>my site</title>").unwrap();
+    let run = update(&bench, &capture(&bench, "0042"), &street().path("pose.json"), &[]);
+    run.refused(10, &["index.html: ", "a page of somebody else"]);
+    assert_eq!(read(&bench, "index.html"), "<title>my site</title>");
+    assert!(bench.is_unchanged());
+}
