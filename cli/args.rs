@@ -322,12 +322,15 @@ pub struct Update {
 /// A region of the map.
 #[derive(Debug, Args)]
 pub struct Region {
-    /// West, south, east, north: grid metres, or degrees with --wgs84
+    /// West, south, east, north: grid metres, e.g. 835500,817700,835700,817900, or degrees with --wgs84
     #[arg(long, value_name = "E0,N0,E1,N1", allow_hyphen_values = true, value_parser = numbers::<4>)]
     pub bbox: Option<[f64; 4]>,
-    /// Lowest and highest height, metres above the map's datum
+    /// Lowest and highest height, metres above the map's datum, e.g. 0,10; alone everywhere in plan
     #[arg(long, value_name = "H0,H1", allow_hyphen_values = true, value_parser = numbers::<2>)]
     pub height: Option<[f64; 2]>,
+    /// The region is in WGS84 degrees (bbox: longitude, latitude, longitude, latitude), and query answers in degrees too
+    #[arg(long)]
+    pub wgs84: bool,
 }
 
 /// Arguments of `query`.
@@ -337,13 +340,13 @@ pub struct Query {
     pub map: PathBuf,
     #[command(flatten)]
     pub region: Region,
-    /// A GeoJSON file with a polygon, grid metres, or degrees with --wgs84
+    /// A GeoJSON file with one polygon, e.g. block.geojson: grid metres, or degrees with --wgs84
     #[arg(long, value_name = "FILE.geojson", conflicts_with = "bbox")]
     pub polygon: Option<PathBuf>,
-    /// Centre of a circle, degrees
+    /// Centre of a circle, WGS84 degrees, e.g. 22.2978,114.1711
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, value_parser = numbers::<2>, requires = "radius", conflicts_with_all = ["bbox", "polygon"])]
     pub near: Option<[f64; 2]>,
-    /// Radius of the circle, metres
+    /// Radius of the circle, metres, e.g. 50
     #[arg(long, value_name = "M", allow_hyphen_values = true, requires = "near")]
     pub radius: Option<f64>,
     /// Version, tag, date or head
@@ -355,12 +358,9 @@ pub struct Query {
     /// Only this class; may be given again
     #[arg(long, value_name = "NAME")]
     pub class: Vec<String>,
-    /// Coordinates in and out are WGS84 degrees
-    #[arg(long)]
-    pub wgs84: bool,
-    /// Form of the answer
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: QueryFormat,
+    /// Form of the answer [default: table, or json with --json]
+    #[arg(long, value_enum)]
+    pub format: Option<QueryFormat>,
 }
 
 /// Form of a query's answer.

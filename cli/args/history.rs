@@ -15,9 +15,9 @@ pub struct Diff {
     pub range: String,
     #[command(flatten)]
     pub region: Region,
-    /// Form of the answer
-    #[arg(long, value_enum, default_value = "text")]
-    pub format: DiffFormat,
+    /// Form of the answer [default: text, or json with --json]
+    #[arg(long, value_enum)]
+    pub format: Option<DiffFormat>,
 }
 
 /// Form of a difference.

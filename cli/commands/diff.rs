@@ -1,6 +1,6 @@
 //! `resurvey diff`.
 
-use super::crs_of;
+use super::{crs_of, one_format};
 use crate::args::{Diff, DiffFormat};
 use crate::console::Console;
 use crate::document;
@@ -18,11 +18,11 @@ pub fn run(options: &Diff, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open_read_only(&options.map)?;
     let (from, to) = map.resolve_range(&options.range)?;
     let crs = crs_of(&map)?;
-    let bounds = region::bbox(&options.region, crs, false)?;
+    let bounds = region::bbox(&options.region, crs)?;
     let deltas = map.changes(from, to, bounds.as_ref())?;
     let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
     let sides = Sides { before: before.classes(), after: after.classes() };
-    match if console.is_json() { DiffFormat::Json } else { options.format } {
+    match one_format(options.format, DiffFormat::Json, DiffFormat::Text, console)? {
         DiffFormat::Json => {
             let changes = deltas.iter().map(|delta| sides.document(delta)).collect::<Result<Vec<_>, _>>()?;
             console.document(&json!({ "from": from.0, "to": to.0, "changes": changes }))?;
@@ -32,6 +32,7 @@ pub fn run(options: &Diff, console: &mut Console<'_>) -> Result<u8, Failure> {
             for delta in &deltas {
                 features.extend(sides.geojson(delta, crs)?);
             }
+            region::tell_unplaced(features.iter().filter(|one| one["geometry"].is_null()).count(), crs, console);
             console.document(&json!({ "type": "FeatureCollection", "features": features }))?;
         }
         DiffFormat::Text => {

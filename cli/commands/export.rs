@@ -21,7 +21,7 @@ pub fn run(options: &Export, console: &mut Console<'_>) -> Result<u8, Failure> {
     let form = form(&options.out)?;
     check_file(&options.out)?;
     let map = MapFile::open_read_only(&options.map)?;
-    let bounds = region::bbox(&options.region, crs_of(&map)?, false)?;
+    let bounds = region::bbox(&options.region, crs_of(&map)?)?;
     let mut things = Things::default();
     let range = options.diff.as_deref().map(|range| map.resolve_range(range)).transpose()?;
     let version = match range {

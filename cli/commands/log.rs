@@ -9,16 +9,16 @@ use crate::plain::plain;
 use crate::region;
 use comfy_table::{Table, presets};
 use resurvey_core::store::{History, MapFile};
-use resurvey_core::version::{Fid, VersionRecord};
+use resurvey_core::version::{BoxMm, Fid, VersionRecord};
 use serde_json::json;
+use std::collections::BTreeSet;
 
 /// Versions that changed something, newest first.
 pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open_read_only(&options.map)?;
-    let bounds = region::bbox(&options.region, crs_of(&map)?, false)?;
+    let bounds = region::bbox(&options.region, crs_of(&map)?)?;
     let mut records: Vec<VersionRecord> = match (options.fid, bounds) {
-        (Some(_), Some(_)) => return Err(Failure::usage("expected a feature id or a region, found both")),
-        (Some(fid), None) => map.log_of(Fid(fid))?,
+        (Some(fid), bounds) => log_of(&map, Fid(fid), bounds.as_ref())?,
         (None, bounds) => map.log(bounds.as_ref())?,
     };
     if let Some(build) = &options.by_plugin {
@@ -56,4 +56,20 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
     console.line(table.trim_fmt())?;
     Ok(0)
+}
+
+/// The versions that changed a feature; with a region those after or before which it lay there.
+fn log_of(map: &MapFile, fid: Fid, bounds: Option<&BoxMm>) -> Result<Vec<VersionRecord>, Failure> {
+    let mut records = map.log_of(fid)?;
+    if let Some(bounds) = bounds {
+        let mut versions = BTreeSet::new();
+        for life in map.lives(fid)? {
+            // A state in the map has a box.
+            if life.state.bounds().is_ok_and(|own| own.intersects(bounds)) {
+                versions.extend(std::iter::once(life.from).chain(life.to));
+            }
+        }
+        records.retain(|record| versions.contains(&record.version));
+    }
+    Ok(records)
 }

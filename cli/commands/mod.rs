@@ -23,6 +23,7 @@ mod review;
 pub mod tag;
 pub mod update;
 
+use crate::console::Console;
 use crate::failure::Failure;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{MapFile, StoreError};
@@ -33,6 +34,17 @@ fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
     frame.crs.parse().map_err(|error: resurvey_core::crs::CrsError| {
         StoreError::Damaged { path: map.path().to_owned(), detail: error.to_string() }.into()
     })
+}
+
+/// The form of an answer, where --format and --json ask for the same.
+fn one_format<F: Copy + PartialEq>(asked: Option<F>, json: F, default: F, console: &Console<'_>) -> Result<F, Failure> {
+    match (asked, console.is_json()) {
+        (Some(asked), true) if asked != json => {
+            Err(Failure::usage("--json is one JSON document: expected no other --format beside it, or --format json"))
+        }
+        (_, true) => Ok(json),
+        (asked, false) => Ok(asked.unwrap_or(default)),
+    }
 }
 
 /// A CSV cell, quoted where it must be (RFC 4180).

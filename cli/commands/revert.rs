@@ -16,7 +16,7 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
     let mut wish = store::Revert {
         version: VersionId(0),
-        region: region::bbox(&options.region, crs_of(&map)?, false)?,
+        region: region::bbox(&options.region, crs_of(&map)?)?,
         author: options.author.clone(),
         message: options.message.clone(),
         idempotency_key: options.retry.idempotency_key.clone(),

@@ -34,13 +34,16 @@ fn a_region_with_its_ends_swapped_is_exit_2() {
         bench.refuses(command, &["--bbox", "10,0,5,1"], 2, &["10 is above 5", "E0 <= E1"]);
         bench.refuses(command, &["--bbox", "0,9,1,8"], 2, &["9 is above 8"]);
         bench.refuses(command, &["--bbox", "0,0,1,1", "--height", "7,6"], 2, &["--height: 7 is above 6"]);
-        bench.refuses(command, &["--height", "1,2"], 2, &["needs a region in plan", "--bbox"]);
     }
     let out = text(&bench.path("out.glb")).to_owned();
     bench.refuses("export", &[&out, "--bbox", "10,0,5,1"], 2, &["10 is above 5"]);
     assert!(!bench.path("out.glb").exists());
     bench.refuses("query", &["--bbox", "0,0,1e300,1"], 2, &["is not within"]);
-    bench.refuses("log", &["7", "--bbox", "0,0,1,1"], 2, &["found both"]);
+    for (words, code) in [(&["--format", "csv"][..], 2), (&["--format", "table"], 2), (&["--format", "json"], 0)] {
+        assert_eq!(bench.run("query", &[words, &["--json"]].concat()).code, code, "{words:?}");
+    }
+    bench.refuses("query", &["--format", "geojson", "--json"], 2, &["--json", "--format json"]);
+    bench.refuses("diff", &["0..1", "--format", "geojson", "--json"], 2, &["--json", "--format json"]);
 }
 
 #[test]
