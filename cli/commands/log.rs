@@ -1,6 +1,6 @@
 //! `resurvey log`.
 
-use super::crs_of;
+use super::{crs_of, versions_by};
 use crate::args::Log;
 use crate::console::Console;
 use crate::document;
@@ -9,7 +9,7 @@ use crate::plain::plain;
 use crate::region;
 use comfy_table::{Table, presets};
 use resurvey_core::store::{History, MapFile};
-use resurvey_core::version::{BoxMm, Fid, VersionRecord};
+use resurvey_core::version::{BoxMm, Fid, VersionId, VersionRecord};
 use serde_json::json;
 use std::collections::BTreeSet;
 
@@ -22,7 +22,7 @@ pub fn run(options: &Log, console: &mut Console<'_>) -> Result<u8, Failure> {
         (None, bounds) => map.log(bounds.as_ref())?,
     };
     if let Some(build) = &options.by_plugin {
-        let versions = map.versions_by(build)?;
+        let versions: BTreeSet<VersionId> = versions_by(&map, build)?.into_iter().collect();
         records.retain(|record| versions.contains(&record.version));
     }
     records.truncate(options.limit.unwrap_or(usize::MAX));

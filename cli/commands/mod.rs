@@ -24,9 +24,11 @@ pub mod tag;
 pub mod update;
 
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, MISSING};
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{MapFile, StoreError};
+use resurvey_core::version::{PluginBuild, VersionId};
+use std::collections::BTreeSet;
 
 /// The map's coordinate reference system.
 fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
@@ -34,6 +36,26 @@ fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
     frame.crs.parse().map_err(|error: resurvey_core::crs::CrsError| {
         StoreError::Damaged { path: map.path().to_owned(), detail: error.to_string() }.into()
     })
+}
+
+/// The versions, newest first, that a build took part in. One that was never seen at all is missing.
+fn versions_by(map: &MapFile, build: &PluginBuild) -> Result<Vec<VersionId>, Failure> {
+    let versions = map.versions_by(build)?;
+    if !versions.is_empty() {
+        return Ok(versions);
+    }
+    let mut known = BTreeSet::new();
+    for used in map.observations()?.into_iter().flat_map(|recorded| recorded.observation.plugins) {
+        if build.is(&used) {
+            return Ok(versions);
+        }
+        let digits: String = used.sha256.map(|sha256| sha256.to_string()).unwrap_or_default().chars().take(8).collect();
+        known.insert(format!("{}@{} ({digits})", used.name, used.version));
+    }
+    let known = known.into_iter().collect::<Vec<_>>().join(", ");
+    let recorded = if known.is_empty() { "no plugin at all".to_owned() } else { known };
+    let text = format!("no plugin {build} in the evidence of this map; recorded are {recorded}");
+    Err(Failure::new(MISSING, anyhow::anyhow!(text)))
 }
 
 /// The form of an answer, where --format and --json ask for the same.

@@ -1,6 +1,6 @@
 //! `resurvey revert`.
 
-use super::crs_of;
+use super::{crs_of, versions_by};
 use crate::args::Revert;
 use crate::conflict::refused;
 use crate::console::Console;
@@ -46,7 +46,7 @@ fn undoing(map: &MapFile, version: VersionId) -> Vec<Delta> {
 }
 
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let versions = map.versions_by(build)?;
+    let versions = versions_by(map, build)?;
     let done = map.revert_all(&versions, wish, Timestamp::now()).map_err(|error| refused(error, map, &[]))?;
     done.iter().for_each(|(_, version)| console.did(format_args!("version {version} was committed")));
     let documents =
