@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 /// Lists, shows and decides proposals.
 pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
+    refuse_what_is_not_used(options)?;
     let id = || {
         let expected = "expected the number of a proposal, as \"resurvey proposals MAP list\" prints it";
         options.id.ok_or_else(|| Failure::usage(expected))
@@ -29,7 +30,12 @@ pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure
         ProposalAction::Accept => accept(options, id()?, console),
         ProposalAction::Reject => {
             let id = id()?;
-            MapFile::open(&options.map)?.reject(id, &options.by, &options.note, Timestamp::now())?;
+            MapFile::open(&options.map)?.reject(
+                id,
+                decider(options),
+                options.note.as_deref().unwrap_or_default(),
+                Timestamp::now(),
+            )?;
             console.did(format_args!("proposal {id} was rejected"));
             if console.is_json() {
                 console.document(&json!({ "id": id, "status": "rejected" }))?;
@@ -39,6 +45,23 @@ pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure
             Ok(0)
         }
     }
+}
+
+/// Refuses what the action would pass over in silence.
+fn refuse_what_is_not_used(options: &Proposals) -> Result<(), Failure> {
+    let is_list = options.action == ProposalAction::List;
+    let decides = matches!(options.action, ProposalAction::Accept | ProposalAction::Reject);
+    let unused = [
+        (is_list && options.id.is_some(), "a number belongs to show, accept and reject"),
+        (!is_list && options.all, "--all belongs to list"),
+        (!decides && options.by.is_some(), "--by belongs to accept and reject"),
+        (!decides && options.note.is_some(), "--note belongs to accept and reject"),
+    ];
+    unused.into_iter().find(|(is_unused, _)| *is_unused).map_or(Ok(()), |(_, text)| Err(Failure::usage(text)))
+}
+
+fn decider(options: &Proposals) -> &str {
+    options.by.as_deref().unwrap_or("resurvey")
 }
 
 fn list(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
@@ -104,7 +127,7 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
     if proposal.status == ProposalStatus::Open {
         refuse_what_is_there(&map, &proposal)?;
     }
-    let accepted = map.accept(id, &options.by, &options.note, Timestamp::now());
+    let accepted = map.accept(id, decider(options), options.note.as_deref().unwrap_or_default(), Timestamp::now());
     let version =
         accepted.map_err(|error| of_proposal(refused(error, &map, &proposal.transaction.deltas), &proposal))?;
     console.did(format_args!("proposal {id} was accepted as version {version}"));

@@ -118,3 +118,33 @@ fn a_setting_that_cannot_be_is_exit_2_with_what_can() {
     }
     bench.refuses("update", &[text(&capture), "--profile", "fast"], 2, &["profile", "fast"]);
 }
+
+#[test]
+fn what_a_command_would_pass_over_in_silence_is_refused() {
+    let bench = Bench::with_street();
+    let (capture, pose) = (street().path("capture/capture.json"), street().path("pose.json"));
+    bench.refuses("tag", &["spring", "1", "--delete"], 2, &["cannot be used with"]);
+    bench.refuses(
+        "update",
+        &[text(&capture), "--pose", text(&pose), "--matcher", "skyline"],
+        2,
+        &["cannot be used with"],
+    );
+    for (words, said) in [
+        (&["list", "1"][..], "a number belongs to show, accept and reject"),
+        (&["show", "1", "--all"], "--all belongs to list"),
+        (&["list", "--by", "ada"], "--by belongs to accept and reject"),
+        (&["show", "1", "--note", "why"], "--note belongs to accept and reject"),
+    ] {
+        bench.refuses("proposals", words, 2, &[said]);
+    }
+}
+
+#[test]
+fn the_help_says_what_the_exit_codes_mean() {
+    let help = resurvey(&["--help"]).ok().out;
+    for code in ["0 ", "1 ", "2 ", "10", "11", "12", "13", "20", "21", "22"] {
+        assert!(help.lines().any(|line| line.starts_with(&format!("  {code}  "))), "{code}: {help}");
+    }
+    assert!(resurvey(&["export", "--help"]).ok().out.contains(".gltf"));
+}
