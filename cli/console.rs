@@ -1,7 +1,7 @@
 //! Where results and messages go: results to standard output, everything else to standard error.
 
 use crate::failure::Failure;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use resurvey_core::localize::Listener;
 use resurvey_schema::service::Level;
 use serde::Serialize;
@@ -64,6 +64,8 @@ impl<'a> Console<'a> {
     pub fn stage(&self, name: &'static str) -> Stage {
         let target = if self.shows_progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1000), target).with_message(name);
+        // What ends early leaves no bar behind.
+        let bar = bar.with_finish(ProgressFinish::AndClear);
         let style = ProgressStyle::with_template("{msg:10} [{bar:40}] {percent:3} % {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
         if self.shows_progress {
