@@ -219,7 +219,7 @@ pub struct Query {
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, value_parser = numbers::<2>, requires = "radius", conflicts_with_all = ["bbox", "polygon"])]
     pub near: Option<[f64; 2]>,
     /// Radius of the circle, metres, e.g. 50
-    #[arg(long, value_name = "M", allow_hyphen_values = true, requires = "near")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = metres, requires = "near")]
     pub radius: Option<f64>,
     /// Version, tag, date or head, e.g. 12 or @2026-03-01
     #[arg(long, default_value = "head", value_name = "REV")]
@@ -342,6 +342,11 @@ pub struct Completions {
 pub struct Man {
     /// Directory, made when it is missing
     pub out: PathBuf,
+}
+
+/// Parses a length; whether it can be one is for the command to say.
+fn metres(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("expected metres, found {text:?}"))
 }
 
 /// Parses a date, or a time with its zone.

@@ -77,8 +77,10 @@ fn tell(mut failure: Failure, console: &mut Console<'_>) -> Failure {
 
 /// The code of a result; says on standard error why it is none, and what was `done` where `output` could not say it. A
 /// closed standard error is nobody's loss.
-fn exit_code(result: Result<u8, Failure>, done: &[String], output: Output<'_>, err: &mut dyn Write) -> u8 {
+fn exit_code(result: Result<u8, Failure>, done: &[String], mut output: Output<'_>, err: &mut dyn Write) -> u8 {
     let code = result.unwrap_or_else(|failure| {
+        // On a terminal what came of the run stands before why it ended. This stream tells its failures at its end.
+        let _ = output.flush();
         let _ = writeln!(err, "resurvey: {}", plain_lines(&failure.to_string()));
         failure.code()
     });

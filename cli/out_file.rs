@@ -32,11 +32,20 @@ pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Makes the directory that the user named, unless it is there.
+pub fn make_directory(path: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(path).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Failure::input(format!("{}: expected a directory, found a file", path.display())),
+        _ => named(path, &error),
+    })
+}
+
 /// The code of a run whose result is told: a file that could not be written makes an error of 0 alone.
 pub fn delivered(code: u8, written: Result<(), Failure>, console: &mut Console<'_>) -> Result<u8, Failure> {
     match written {
         Err(failure) if code == 0 => Err(failure),
         Err(failure) => {
+            console.out().flush()?;
             console.message(&format!("resurvey: {failure}"));
             Ok(code)
         }
@@ -99,6 +108,8 @@ impl<'b> Staged<'b> {
             Err(_) => None,
         };
         let directory = place.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // What is wrong with the directory is said in the system's words.
+        fs::metadata(directory)?;
         match beside(directory, there.as_ref(), bytes) {
             Ok(file) => Ok(Self::Beside(file, place)),
             Err(error) if error.kind() == ErrorKind::PermissionDenied && there.is_some() => {
@@ -122,7 +133,8 @@ fn beside(directory: &Path, replaced: Option<&fs::Metadata>, bytes: &[u8]) -> io
     builder.prefix(".resurvey-");
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(directory)?;
+    // The error would name a file that nobody asked for.
+    let mut file = builder.tempfile_in(directory).map_err(|error| io::Error::from(error.kind()))?;
     file.write_all(bytes)?;
     if let Some(replaced) = replaced {
         file.as_file().set_permissions(replaced.permissions())?;

@@ -30,7 +30,11 @@ pub fn bbox(region: &Region, crs: Crs) -> Result<Option<BoxMm>, Failure> {
     }
     let corners = if region.wgs84 {
         let corners = [(south, west), (south, east), (north, west), (north, east)];
-        corners.iter().map(|(lat, lon)| grid_point(crs, *lat, *lon)).collect::<Result<Vec<_>, _>>()?
+        let order = "--bbox with --wgs84 is longitude,latitude,longitude,latitude";
+        let point = |(lat, lon): &(f64, f64)| {
+            grid_point(crs, *lat, *lon).map_err(|error| Failure::usage(format!("{error}; {order}")))
+        };
+        corners.iter().map(point).collect::<Result<Vec<_>, _>>()?
     } else {
         vec![GridPoint::new(west, south, 0.0), GridPoint::new(east, north, 0.0)]
     };
@@ -120,7 +124,9 @@ impl Shape {
     pub fn read_polygon(path: &Path, crs: Crs, is_wgs84: bool) -> Result<Self, Failure> {
         let place = path.display();
         let text = std::fs::read_to_string(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
-        let document: GeoJson = text.parse().map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        let document: GeoJson = text.parse().map_err(|error| {
+            Failure::input(format!("{place}: expected one GeoJSON polygon, found something else: {error}"))
+        })?;
         let rings = match geometry(document) {
             Ok(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
             other => {

@@ -22,13 +22,14 @@ const AUTHOR: &str = "resurvey";
 pub fn run(options: &Apply, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
     let head = map.head()?;
-    let about = |failure: Failure| failure.about(&options.file);
-    let text = read(&options.file).map_err(|error| about(Failure::input(error)))?;
+    let file = if options.file == Path::new("-") { Path::new("standard input") } else { &options.file };
+    let about = |failure: Failure| failure.about(file);
+    let text = read(&options.file).map_err(about)?;
     let classes = map.classes(head)?;
     let mut changes = read_change_set(&text, &classes).map_err(|error| about(error.into()))?;
     check_geometries(&changes, &classes).map_err(about)?;
     if is_of_another_history(&map, head, &changes).map_err(about)? {
-        let (file, base) = (options.file.display(), changes.base.take().unwrap_or(head));
+        let (file, base) = (file.display(), changes.base.take().unwrap_or(head));
         let whose = changes.map_id.as_deref().map_or_else(String::new, |map_id| format!(" (made from map {map_id})"));
         console.message(&format!(
             "note: version {base} of {file}{whose} is not one of this map: every \"before\" is checked, and nothing else that \
@@ -112,11 +113,15 @@ fn classes_of(mesh: &Mesh) -> BTreeSet<ClassId> {
     classes
 }
 
-fn read(path: &Path) -> std::io::Result<String> {
-    if path == Path::new("-") {
-        let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text)?;
-        return Ok(text);
-    }
-    std::fs::read_to_string(path)
+fn read(path: &Path) -> Result<String, Failure> {
+    let bytes = if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+    } else {
+        std::fs::read(path)
+    };
+    let text = String::from_utf8(bytes.map_err(Failure::input)?)
+        .map_err(|_| Failure::input("expected a change set as JSON lines in UTF-8, found bytes that are no text"))?;
+    // Some editors begin a text with a mark of its byte order.
+    Ok(if let Some(rest) = text.strip_prefix('\u{feff}') { rest.to_owned() } else { text })
 }

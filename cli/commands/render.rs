@@ -4,7 +4,7 @@ use super::crs_of;
 use crate::args::Render;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::out_file::write_files;
+use crate::out_file::{make_directory, write_files};
 use crate::prior::{Placed, read_placed};
 use resurvey_core::camera::Camera;
 use resurvey_core::capture::read_pose;
@@ -43,8 +43,7 @@ pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
     let points = lidar::scan(&view, LIDAR_SPACING_M);
     let depth: Vec<u16> = view.range_m.values().iter().map(|range_m| grey(f64::from(*range_m))).collect();
     let depth = Raster::from_values(view.range_m.width(), view.range_m.height(), depth).expect("one level per pixel");
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| Failure::input(format!("{}: {error}", options.out.display())))?;
+    make_directory(&options.out)?;
     let document = json!({
         "version": snapshot.version().0,
         "pose": pose,

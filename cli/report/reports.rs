@@ -5,7 +5,7 @@ use super::page;
 use super::section::GENERATED;
 use super::sheet::Sheet;
 use crate::failure::Failure;
-use crate::out_file::write_file;
+use crate::out_file::{make_directory, write_file};
 use std::path::{Path, PathBuf};
 
 /// The reports of one run.
@@ -21,8 +21,7 @@ pub struct Reports {
 impl Reports {
     /// Reports in `directory`, which is made when it is missing: what cannot be written is said before a map changes.
     pub fn start(directory: &Path) -> Result<Self, Failure> {
-        let wrong = |error: std::io::Error| Failure::input(format!("{}: {error}", directory.display()));
-        std::fs::create_dir_all(directory).map_err(wrong)?;
+        make_directory(directory)?;
         refuse_others(&directory.join("index.html"))?;
         let mut reports = Self {
             directory: directory.to_owned(),

@@ -11,7 +11,7 @@ pub const FORMAT: &str = "resurvey.changes/1";
 
 /// First line of a change set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a header, {\"format\": …}")]
 pub struct ChangeSetHeader {
     /// Always [`FORMAT`].
     pub format: String,
@@ -52,7 +52,7 @@ pub enum Op {
 
 /// One operation, one line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an operation, {\"op\": …}")]
 pub struct ChangeLine {
     /// What it does.
     pub op: Op,
@@ -101,7 +101,7 @@ pub struct ObjectFile {
 /// `width_m`, `height_m`, `area_m2`) are written for readers and ignored when read; so is the `kind` of a state that an
 /// answer printed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a descriptor, {\"class\": …}")]
 pub struct DescriptorFile {
     /// `material` or `dynamic`, which the other keys say too.
     #[serde(default, skip_serializing)]

@@ -154,3 +154,19 @@ fn a_set_without_an_author_is_committed_by_resurvey() {
     bench.json("apply", &[&bench.file("set.jsonl", text)]);
     assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["author"], "resurvey");
 }
+
+#[test]
+fn a_set_that_another_program_wrote_is_told_in_its_own_words() {
+    let bench = furnished();
+    let add = set(Some(1), &[json!({"op": "add", "after": chair_at(9.0)})]);
+    let marked = format!("\u{feff}{}", add.replace('\n', "\r\n"));
+    bench.run("apply", &[&bench.file("marked.jsonl", marked)]).ok();
+    for (text, word) in
+        [("[]", "line 1: invalid length 0, expected a header"), ("7", "expected a header, {\"format\": …}")]
+    {
+        bench.run("apply", &[&bench.file("set.jsonl", text)]).refused(10, &[word]);
+    }
+    let line = set(Some(1), &[json!([])]);
+    bench.run("apply", &[&bench.file("set.jsonl", line)]).refused(10, &["line 2: ", "expected an operation"]);
+    bench.run("apply", &[&bench.file("set.jsonl", [0xff_u8; 9])]).refused(10, &["set.jsonl: ", "in UTF-8"]);
+}

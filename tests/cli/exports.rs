@@ -65,7 +65,8 @@ fn a_suffix_without_a_format_is_exit_2_and_writes_nothing() {
         assert!(!out.exists());
     }
     let nowhere = bench.path("no/such/out.glb");
-    bench.refuses("export", &[text(&nowhere)], 10, &["no/such/out.glb"]);
+    bench.refuses("export", &[text(&nowhere)], 10, &["no/such/out.glb: No such file or directory"]);
+    assert!(!bench.run("export", &[text(&nowhere)]).err.contains(".resurvey-"));
     bench.refuses("export", &[text(&bench.path("out.glb")), "--at", "9"], 11, &["no version 9"]);
 }
 

@@ -10,6 +10,7 @@ fn a_command_line_that_is_none_is_exit_2_and_explains_itself() {
         (&["query", "map.rsv", "--bbox", "1,2,3"], "expected 4 numbers with commas, found 3"),
         (&["query", "map.rsv", "--bbox", "1,2,3,NaN"], "expected finite numbers, found NaN"),
         (&["query", "map.rsv", "--near", "22.3,114.17"], "--radius"),
+        (&["query", "map.rsv", "--near", "22.3,114.17", "--radius", "far"], "expected metres, found \"far\""),
         (&["query", "map.rsv", "--near", "22.3,114.17", "--radius", "5", "--bbox", "1,2,3,4"], "cannot be used with"),
         (&["query", "map.rsv", "--format", "xml"], "[possible values: table, json, geojson, csv]"),
         (&["import", "map.rsv", "a.3ds", "--up", "x"], "[possible values: y, z]"),
@@ -54,6 +55,9 @@ fn a_place_that_is_not_on_the_map_is_refused_with_its_numbers() {
     bench.refuses("query", &["--near", "22.3,114.17", "--radius", "-1"], 2, &["--radius -1"]);
     bench.refuses("query", &["--near", "22.3,114.17", "--radius", "NaN"], 2, &["--radius NaN"]);
     bench.refuses("query", &["--wgs84", "--bbox", "200,0,201,1"], 2, &["20"]);
+    let swapped = ["--wgs84", "--bbox", "22.29,114.16,22.30,114.18"];
+    bench.refuses("query", &swapped, 2, &["latitude 114.16", "longitude,latitude,longitude,latitude"]);
+    bench.refuses("query", &["--bbox=-1e308,0,1,1"], 2, &["easting -1e308 m"]);
 }
 
 #[test]
