@@ -23,7 +23,7 @@ use std::path::PathBuf;
 #[command(name = "resurvey", version, arg_required_else_help = true, subcommand_required = true, after_help = CODES)]
 pub struct Cli {
     /// Print one JSON document instead of text
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = EVERYWHERE)]
     pub json: bool,
     #[command(flatten)]
     pub plugins: PluginSearch,
@@ -31,6 +31,9 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// Over the options of every command, which would stand between a command's own.
+const EVERYWHERE: &str = "Options of every command";
 
 /// What exit codes mean, below the help.
 const CODES: &str = "\
@@ -48,6 +51,7 @@ Exit codes:
 
 /// Where plugins beside the built-in ones come from.
 #[derive(Debug, Args)]
+#[command(next_help_heading = EVERYWHERE)]
 pub struct PluginSearch {
     /// Directory with plugin libraries, e.g. ./plugins, beside RESURVEY_PLUGIN_PATH and the user's data directory; may be
     /// given again

@@ -152,3 +152,15 @@ fn the_help_says_what_the_exit_codes_mean() {
     }
     assert!(resurvey(&["export", "--help"]).ok().out.contains(".gltf"));
 }
+
+#[test]
+fn the_options_of_every_command_stand_below_its_own() {
+    for command in ["query", "update", "fsck", "plugins"] {
+        let help = resurvey(&[command, "--help"]).ok().out;
+        let (own, everywhere) = help.split_once("Options of every command:").unwrap();
+        for option in ["--json", "--plugin-dir", "--plugin-timeout", "--in-process"] {
+            assert!(everywhere.contains(option) && !own.contains(&format!("{option} ")), "{command} {option}: {help}");
+        }
+        assert!(own.contains("Options:") || command == "plugins", "{help}");
+    }
+}
