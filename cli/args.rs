@@ -258,6 +258,7 @@ pub struct Log {
     /// Map file
     pub map: PathBuf,
     /// Only versions that changed this feature
+    #[arg(value_parser = number)]
     pub fid: Option<u64>,
     #[command(flatten)]
     pub region: Region,
@@ -276,6 +277,7 @@ pub struct Why {
     /// Map file
     pub map: PathBuf,
     /// Feature id, as query prints it
+    #[arg(value_parser = number)]
     pub fid: u64,
 }
 
@@ -346,6 +348,11 @@ pub struct Completions {
 pub struct Man {
     /// Directory, made when it is missing
     pub out: PathBuf,
+}
+
+/// Parses the number of a feature or proposal.
+fn number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a number, found {text:?}"))
 }
 
 /// Parses a length; whether it can be one is for the command to say.

@@ -1,6 +1,6 @@
 //! Arguments of the commands on history: difference, undo, names, change sets, review, forgetting.
 
-use super::Region;
+use super::{Region, number};
 use clap::{Args, ValueEnum};
 use resurvey_core::version::PluginBuild;
 use std::path::PathBuf;
@@ -98,6 +98,7 @@ pub struct Proposals {
     #[arg(value_enum, default_value = "list")]
     pub action: ProposalAction,
     /// Number of the proposal, as list prints it
+    #[arg(value_parser = number)]
     pub id: Option<u64>,
     /// Also list what was accepted or rejected (with list)
     #[arg(long)]

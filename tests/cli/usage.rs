@@ -16,6 +16,8 @@ fn a_command_line_that_is_none_is_exit_2_and_explains_itself() {
         (&["import", "map.rsv", "a.3ds", "--up", "x"], "[possible values: y, z]"),
         (&["import", "map.rsv", "a.3ds", "--void-index", "256"], "256 is not in 0..=255"),
         (&["why", "map.rsv", "-1"], "unexpected argument"),
+        (&["why", "map.rsv", "banner"], "expected a number, found \"banner\""),
+        (&["proposals", "map.rsv", "show", "first"], "expected a number, found \"first\""),
         (&["localize", "map.rsv", "capture.json", "--truth", "truth.json"], "--heatmap"),
         (&["completions", "cmd.exe"], "invalid value"),
     ] {
