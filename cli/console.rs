@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use resurvey_core::localize::Listener;
 use resurvey_schema::service::Level;
 use serde::Serialize;
@@ -17,12 +17,13 @@ pub struct Console<'a> {
     is_json: bool,
     shows_progress: bool,
     interrupt: Interrupt,
+    done: Vec<String>,
 }
 
 impl<'a> Console<'a> {
     /// A console; `is_json` is the `--json` option.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, is_json: bool, shows_progress: bool) -> Self {
-        Self { out, err, is_json, shows_progress, interrupt: Interrupt::default() }
+        Self { out, err, is_json, shows_progress, interrupt: Interrupt::default(), done: Vec::new() }
     }
 
     /// Lets `interrupt` end what [`listens`](Self::listen).
@@ -66,10 +67,22 @@ impl<'a> Console<'a> {
         let _ = writeln!(self.err, "{text}");
     }
 
+    /// Notes what is on disk now, for a user who cannot be told the result.
+    pub fn did(&mut self, what: impl std::fmt::Display) {
+        self.done.push(what.to_string());
+    }
+
+    /// What was noted.
+    pub fn take_done(self) -> Vec<String> {
+        self.done
+    }
+
     /// A stage with a progress bar, when standard error is a terminal.
     pub fn stage(&self, name: &'static str) -> Stage {
         let target = if self.shows_progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1000), target).with_message(name);
+        // What ends early leaves no bar behind.
+        let bar = bar.with_finish(ProgressFinish::AndClear);
         let style = ProgressStyle::with_template("{msg:10} [{bar:40}] {percent:3} % {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
         if self.shows_progress {

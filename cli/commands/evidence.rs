@@ -5,6 +5,7 @@ use crate::commands::localize::pose_text;
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use resurvey_core::store::{History, MapFile, Provenance, RecordedObservation};
 use resurvey_core::version::{Fid, Observation, VersionId};
 use resurvey_schema::ClassTable;
@@ -108,9 +109,9 @@ fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
 
 fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
     let record = &step.record;
-    let (version, kind, author) = (record.version, record.kind.name(), &record.author);
+    let (version, kind, author) = (record.version, record.kind.name(), plain(&record.author));
     console.line(format_args!("version {version}: {} by {kind}, {author}, {}", op(step), record.committed_at))?;
-    console.line(format_args!("  message   {}", record.message))?;
+    console.line(format_args!("  message   {}", plain(&record.message)))?;
     console.line(format_args!("  hash      {}", record.hash))?;
     for (side, state) in [("before", step.delta.before()), ("after", step.delta.after())] {
         if let Some(state) = state {
@@ -118,7 +119,8 @@ fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut C
         }
     }
     if let Some(reverted) = record.reverts {
-        console.line(format_args!("  undoes    version {reverted}: {}", map.version(reverted)?.message))?;
+        let message = map.version(reverted)?.message;
+        console.line(format_args!("  undoes    version {reverted}: {}", plain(&message)))?;
         if let Some(seen) = map.observation_of(reverted)? {
             print_observation(map, &seen, classes, console)?;
         }
@@ -189,14 +191,19 @@ fn print_single(
     }
     for used in &seen.plugins {
         let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
-        console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
-        console.line(format_args!("            {}", used.settings))?;
+        let (name, version) = (plain(&used.name), plain(&used.version));
+        console.line(format_args!("  {:9} {name} {version} {sha256}", used.kind))?;
+        console.line(format_args!("            {}", plain(&used.settings.to_string())))?;
     }
     for rejection in &seen.rejections {
         let (before, after) = (classes.name(rejection.class_before), classes.name(rejection.class_after));
         console.line(format_args!(
             "  rejected  {before} -> {after}, {} px: {} is {:.3} {}, limit {:.3}",
-            rejection.pixels, rejection.requirement, rejection.measured, rejection.unit, rejection.limit
+            rejection.pixels,
+            plain(&rejection.requirement),
+            rejection.measured,
+            plain(&rejection.unit),
+            rejection.limit
         ))?;
     }
     Ok(())

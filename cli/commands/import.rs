@@ -4,6 +4,7 @@ use super::crs_of;
 use crate::args::{Import, UpAxis};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::plain::plain;
 use jiff::Timestamp;
 use resurvey_core::crs::{Crs, LocalOrigin};
 use resurvey_core::image::LabelReading;
@@ -45,9 +46,10 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
     let version = map.commit(&transaction, Timestamp::now())?;
     console.finish(&stage);
+    console.did(format_args!("version {version} was committed"));
     for (file, report) in &reports {
         for warning in &report.warnings {
-            console.message(&format!("{file}: {warning}"));
+            console.message(&plain(&format!("warning: {file}: {warning}")));
         }
     }
     if console.is_json() {

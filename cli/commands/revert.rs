@@ -1,14 +1,15 @@
 //! `resurvey revert`.
 
-use super::crs_of;
+use super::{crs_of, versions_by};
 use crate::args::Revert;
+use crate::conflict::refused;
 use crate::console::Console;
 use crate::failure::{Failure, NOTHING};
 use crate::region;
 use jiff::Timestamp;
 use resurvey_core::store::{self, CommitError, History, MapFile};
 use resurvey_core::update::refuse_doubles;
-use resurvey_core::version::{PluginBuild, VersionId};
+use resurvey_core::version::{Delta, PluginBuild, VersionId};
 use serde_json::{Value, json};
 
 /// Undoes one version by a new one, or all that a plugin build did by one for each.
@@ -16,7 +17,7 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
     let mut wish = store::Revert {
         version: VersionId(0),
-        region: region::bbox(&options.region, crs_of(&map)?, false)?,
+        region: region::bbox(&options.region, crs_of(&map)?)?,
         author: options.author.clone(),
         message: options.message.clone(),
         idempotency_key: options.retry.idempotency_key.clone(),
@@ -25,11 +26,13 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
         (Some(build), _) => all_of(&map, build, &wish, console),
         (None, Some(revision)) => {
             wish.version = map.resolve(revision)?;
-            let version = map.together(|map| -> Result<_, CommitError> {
+            let reverted = map.together(|map| -> Result<_, CommitError> {
                 let version = map.revert(&wish, Timestamp::now())?;
                 refuse_doubles(map, version)?;
                 Ok(version)
-            })?;
+            });
+            let version = reverted.map_err(|error| refused(error, &map, &undoing(&map, wish.version)))?;
+            console.did(format_args!("version {version} was committed"));
             let document = undone(&map, wish.version, version)?;
             if console.is_json() {
                 console.document(&document)?;
@@ -42,13 +45,20 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
 }
 
+/// What an undo of `version` changes, for telling why it was refused.
+fn undoing(map: &MapFile, version: VersionId) -> Vec<Delta> {
+    map.changes_of(version).unwrap_or_default().into_iter().map(Delta::undone).collect()
+}
+
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let versions = map.versions_by(build)?;
+    let versions = versions_by(map, build)?;
     let done = map.together(|map| -> Result<_, CommitError> {
         let done = map.revert_all(&versions, wish, Timestamp::now())?;
         done.iter().try_for_each(|(_, version)| refuse_doubles(map, *version))?;
         Ok(done)
-    })?;
+    });
+    let done = done.map_err(|error| refused(error, map, &[]))?;
+    done.iter().for_each(|(_, version)| console.did(format_args!("version {version} was committed")));
     let documents =
         done.iter().map(|(reverts, version)| undone(map, *reverts, *version)).collect::<Result<Vec<_>, _>>()?;
     if console.is_json() {

@@ -30,6 +30,7 @@ mod provenance;
 mod reports;
 mod reviews;
 mod segmenters;
+mod streams;
 mod table_v;
 mod time_axes;
 mod undoing;

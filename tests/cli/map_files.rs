@@ -149,6 +149,8 @@ fn a_map_that_another_writes_is_exit_21_after_a_wait() {
          {\"op\":\"add\",\"after\":{\"class\":\"chair\",\"position\":[835600,817800,4.5]}}\n",
     );
     bench.refuses("apply", &[&changes], 21, &["another process is writing", "try again"]);
+    let busy = bench.run("apply", &[&changes, "--json"]);
+    assert_eq!((busy.code, busy.json()), (21, serde_json::json!({"decision": "busy", "version": null})));
     // Readers are not held up.
     assert_eq!(bench.json("query", &[])["version"], 1);
     writer.execute_batch("ROLLBACK").unwrap();
@@ -178,4 +180,30 @@ fn a_map_that_one_process_has_open_twice_loses_nothing_to_another_process() {
     let tags = bench.json("tag", &[]);
     let names: Vec<&str> = tags["tags"].as_array().unwrap().iter().map(|tag| tag["tag"].as_str().unwrap()).collect();
     assert_eq!(names, ["after", "before", "during"]);
+}
+
+#[test]
+fn a_file_too_damaged_to_open_is_told_by_fsck_as_any_damage() {
+    let bench = Bench::with_street();
+    let whole = fs::read(bench.path("map.rsv")).unwrap();
+    let mut headless = whole.clone();
+    headless[..100].fill(0);
+    let files = [
+        ("cut.rsv", &whole[..whole.len() / 2 + 100], "it ends after"),
+        ("headless.rsv", &headless, "another kind of file"),
+        ("empty.rsv", &[], "an empty file"),
+    ];
+    for (name, bytes, word) in files {
+        let file = bench.file(name, bytes);
+        for words in [&["fsck", file.as_str(), "--json"][..], &["fsck", &file, "--json", "--repair"]] {
+            let run = resurvey(words);
+            assert_eq!(run.code, 13, "{}", run.err);
+            let document = run.json();
+            let problem = document["problems"][0].as_str().unwrap();
+            assert!(document["ok"] == false && problem.starts_with("file: ") && problem.contains(word), "{document}");
+            assert!(!run.err.contains("resurvey fsck"), "fsck sends to itself: {}", run.err);
+        }
+    }
+    let missing = resurvey(&["fsck", text(&bench.path("none.rsv")), "--json"]);
+    missing.refused(11, &["no such map"]);
 }

@@ -84,15 +84,23 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
     update(&bench, &capture(), &["--propose"]);
     assert_eq!(bench.run("proposals", &["reject", "1", "--note", "a shadow"]).ok().out, "proposal 1 is rejected\n");
     for action in ["accept", "reject"] {
-        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already"]);
-        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9"]);
+        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already", "MAP show 1"]);
+        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9", "list --all"]);
         bench.run("proposals", &[action]).refused(2, &["the number of a proposal"]);
     }
     bench.run("proposals", &["show", "9"]).refused(11, &["no proposal 9"]);
     bench.run("proposals", &["weigh", "1"]).refused(2, &["[possible values: list, show, accept, reject]"]);
     assert!(bench.run("proposals", &["show", "1"]).ok().out.contains("a shadow"));
-    // Sent again it is not a new one.
-    assert_eq!(update(&bench, &capture(), &["--propose"])["proposals"], json!([1]));
+    // Sent again it is not a new one, and nothing waits.
+    let pose = street().path("pose.json");
+    for words in [&["--propose"][..], &["--confirm", "2"]] {
+        let again = bench.run("update", &[&[&capture(), "--pose", text(&pose), "--json"], words].concat());
+        let document = again.json();
+        assert_eq!((again.code, &document["decision"], &document["proposals"]), (20, &json!("nothing"), &json!([1])));
+        assert_eq!(document["decided"], json!([{"id": 1, "status": "rejected"}]));
+    }
+    let told = bench.run("update", &[&capture(), "--pose", text(&pose), "--propose"]);
+    assert!(told.out.contains("proposal  1, rejected before"), "{}", told.out);
     assert_eq!(bench.json("proposals", &[])["proposals"], json!([]));
     assert_eq!(bench.head(), 1);
 }
@@ -105,6 +113,15 @@ fn what_is_on_the_map_by_now_is_not_accepted_again() {
     assert_eq!(update(&bench, &other, &["--propose"])["proposals"], json!([2]));
     bench.json("proposals", &["accept", "2"]);
     bench.run("proposals", &["accept", "1"]).refused(21, &["is where proposal 1 puts its own", "proposals show 1"]);
+    let taken = bench.run("proposals", &["accept", "1", "--json"]);
+    let fid = bench.json("query", &["--class", "banner"])["features"][0]["fid"].clone();
+    let there = json!([{"fid": fid, "changed_in": 2, "is_on_map": true, "is_target": false}]);
+    let expected = json!({"decision": "conflict", "base_version": 1, "head": 2, "version": null, "conflicts": there,
+        "looked_at_by": [], "id": 1, "status": "open"});
+    assert_eq!((taken.code, taken.json()), (21, expected));
+    let decided = bench.run("proposals", &["reject", "2", "--json"]);
+    let expected = json!({"decision": "conflict", "id": 2, "status": "accepted", "version": null});
+    assert_eq!((decided.code, decided.json()), (21, expected));
     assert_eq!(bench.json("query", &["--class", "banner"])["features"].as_array().map(Vec::len), Some(1));
     assert_eq!((bench.head(), bench.json("proposals", &[])["proposals"][0]["id"].clone()), (2, json!(1)));
 }
@@ -128,6 +145,7 @@ fn a_change_becomes_a_version_when_enough_captures_agree() {
     assert_eq!((&third["decision"], &third["version"]), (&json!("committed"), &json!(2)));
     let banner = bench.json("query", &["--class", "banner"])["features"][0].clone();
     assert_eq!(banner["fid"], third["changes"][0]["fid"]);
+    assert_eq!(third["changes"], bench.json("diff", &["1..2"])["changes"]);
     // The same place three times: as it was, and √3 surer.
     let one = &first["changes"][0]["after"];
     let sigma = |state: &Value| state["sigma_m"].as_f64().unwrap();

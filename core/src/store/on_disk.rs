@@ -67,10 +67,12 @@ pub(super) fn has_write_ahead_log(path: &Path) -> bool {
 /// A URI that tells SQLite that nobody writes to the file.
 pub(super) fn immutable_uri(path: &Path) -> String {
     let mut uri = "file:".to_owned();
-    for character in path.to_string_lossy().chars() {
-        match character {
-            '%' | '?' | '#' => uri += &format!("%{:02X}", character as u32),
-            _ => uri.push(character),
+    for &byte in path.as_os_str().as_encoded_bytes() {
+        // A name need not be UTF-8, a URI is ASCII.
+        if byte.is_ascii() && !b"%?#".contains(&byte) {
+            uri.push(char::from(byte));
+        } else {
+            uri += &format!("%{byte:02X}");
         }
     }
     uri + "?immutable=1"
