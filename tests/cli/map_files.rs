@@ -167,8 +167,8 @@ fn a_map_that_one_process_has_open_twice_loses_nothing_to_another_process() {
     let bench = Bench::with_empty_map();
     let path = bench.path("map.rsv");
     let tag_elsewhere = |name: &str| {
-        let status = Command::new(env!("CARGO_BIN_EXE_resurvey")).arg("tag").arg(&path).arg(name).status().unwrap();
-        assert!(status.success());
+        let run = Command::new(env!("CARGO_BIN_EXE_resurvey")).arg("tag").arg(&path).arg(name).output().unwrap();
+        assert!(run.status.success());
     };
     let first = MapFile::open(&path).unwrap();
     drop(MapFile::open(&path).unwrap());

@@ -53,7 +53,8 @@ fn an_undo_does_not_put_a_chair_into_the_one_that_stands_there_by_now() {
     bench.apply(&[json!({"op": "add", "after": chair_at(0.1)})]);
     let run = bench.run("revert", &["2", "--json"]);
     assert_eq!(run.code, 21, "{run:?}");
-    assert_eq!(run.json()["conflicts"], json!([{"fid": 3, "changed_in": 3, "is_on_map": true, "is_target": false}]));
+    let there = json!({"fid": 3, "changed_in": 3, "is_on_map": true, "is_target": false, "found": chair_state(0.1)});
+    assert_eq!(run.json()["conflicts"], json!([there]));
     assert_eq!(bench.head(), 3);
     // Once that is gone, there is room.
     bench.json("revert", &["3"]);

@@ -1,6 +1,7 @@
 //! Wrong command lines: exit code 2, or 11 for a name that nothing has.
 
 use crate::bench::{Bench, resurvey, street, text};
+use serde_json::json;
 
 #[test]
 fn a_command_line_that_is_none_is_exit_2_and_explains_itself() {
