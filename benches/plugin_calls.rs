@@ -122,7 +122,8 @@ fn many_ms(matcher: &mut Matcher) -> f64 {
     let all: Vec<Rasters> = (0..8).map(|_| Rasters::new(96, 72)).collect();
     let photo = Raster::filled(96, 72, 6);
     best_ms(10, || {
-        let scores = matcher.score_each(&photo, VIEWS, &mut |index, take| take(&all[index % all.len()].view()));
+        let view = &mut |index: usize, take: &mut dyn FnMut(&ViewImages<'_>)| take(&all[index % all.len()].view());
+        let scores = matcher.score_each(&photo, VIEWS, view, &|| false);
         assert_eq!(scores.unwrap().len(), VIEWS);
     })
 }

@@ -1,12 +1,14 @@
 //! The command line: names, options, units, defaults and help.
 
+mod captures;
 mod eval;
 mod history;
 mod plugins;
 
+pub use captures::{LabelsFrom, Localize, PriorFrom, Render, Settings, Update};
 pub use eval::{Eval, Experiment, TableV};
 pub use history::{Changes, Diff, DiffFormat, Gc, ProposalAction, Proposals, Retry, Revert, Tag};
-pub use plugins::{Check, Install, Language, Limits, New, NewKind, Plugins};
+pub use plugins::{Check, Install, Language, Limits, New, NewForm, NewKind, Plugins};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use jiff::Timestamp;
@@ -18,10 +20,10 @@ use std::path::PathBuf;
 ///
 /// A map is one file (*.rsv). Results go to standard output, progress and messages to standard error.
 #[derive(Debug, Parser)]
-#[command(name = "resurvey", version, arg_required_else_help = true, subcommand_required = true)]
+#[command(name = "resurvey", version, arg_required_else_help = true, subcommand_required = true, after_help = CODES)]
 pub struct Cli {
     /// Print one JSON document instead of text
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = EVERYWHERE)]
     pub json: bool,
     #[command(flatten)]
     pub plugins: PluginSearch,
@@ -30,13 +32,34 @@ pub struct Cli {
     pub command: Command,
 }
 
+/// Over the options of every command, which would stand between a command's own.
+const EVERYWHERE: &str = "Options of every command";
+
+/// What exit codes mean, below the help.
+const CODES: &str = "\
+Exit codes:
+  0   done
+  1   internal error: a bug
+  2   bad usage
+  10  bad input file, or a file that cannot be written
+  11  no such thing: map, version, tag, feature, proposal, class, plugin
+  12  a plugin failed or was refused
+  13  map file damaged, of a newer format, read-only, or on a disk that refuses
+  20  nothing to update
+  21  conflict: the map changed since the base version, or another process is writing to it
+  22  pose not reliable, nothing committed
+  130 interrupted";
+
 /// Where plugins beside the built-in ones come from.
 #[derive(Debug, Args)]
+#[command(next_help_heading = EVERYWHERE)]
 pub struct PluginSearch {
-    /// Directory with plugin libraries, beside RESURVEY_PLUGIN_PATH and the user's data directory; may be given again
+    /// Directory with plugin libraries, e.g. ./plugins, beside RESURVEY_PLUGIN_PATH and the user's data directory; may be
+    /// given again
     #[arg(long, global = true, value_name = "DIR")]
     pub plugin_dir: Vec<PathBuf>,
-    /// SHA-256 of a plugin library that may be loaded, as "plugins list --verbose" prints it; may be given again
+    /// SHA-256 of a plugin library that may be loaded, all 64 digits, e.g. as "plugins list --verbose" prints it; may be
+    /// given again
     #[arg(long, global = true, value_name = "SHA256")]
     pub allow_plugin: Vec<String>,
     /// Seconds of its own that a plugin from a file has for one call, e.g. 30
@@ -94,7 +117,7 @@ pub enum Command {
     Export(Export),
     /// Compare matchers on captures with known truth; changes nothing on disk but the file you name with --csv
     Eval(Eval),
-    /// Run the plugins of a version again on what it saw, and compare
+    /// Run the plugins of a version again on what it saw, and compare; changes nothing
     Replay(Replay),
     /// List, check, install and remove plugins; no map is touched
     #[command(subcommand)]
@@ -139,16 +162,16 @@ pub struct Import {
     /// The model's up axis; default: what the format says
     #[arg(long, value_enum)]
     pub up: Option<UpAxis>,
-    /// Turn the model clockwise about the up axis before it is moved to the origin, degrees
+    /// Turn the model clockwise about the up axis before it is moved to the origin, degrees, e.g. 90
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     pub rotate: f64,
     /// Classes of materials, TOML: name = "class", default = "class"
     #[arg(long, value_name = "FILE")]
     pub map_classes: Option<PathBuf>,
-    /// Take the nearest class colour within this distance (0–441) in label textures, for lossy ones such as JPG
+    /// Take the nearest class colour within this distance (0–441), e.g. 30, in label textures, for lossy ones such as JPG
     #[arg(long, value_name = "DISTANCE")]
     pub nearest_colour: Option<f64>,
-    /// Index that means "unlabelled" in label textures
+    /// Index that means "unlabelled" in label textures, e.g. 0
     #[arg(long, value_name = "INDEX")]
     pub void_index: Option<u8>,
     /// When the model was surveyed, a date or a time with its zone, e.g. 2025-11-30; default: unknown
@@ -173,161 +196,18 @@ pub enum UpAxis {
     Z,
 }
 
-/// Choice and settings of plugins.
-#[derive(Debug, Args)]
-pub struct Settings {
-    /// A setting of a plugin or of the gate; "resurvey plugins info NAME" lists them. May be given again
-    #[arg(long, value_name = "PLUGIN.KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Behaviour of all plugins that know profiles: default, or paper as published
-    #[arg(long, value_name = "NAME")]
-    pub profile: Option<String>,
-}
-
-/// Where the position, height and heading of the prior come from, beside capture.json.
-#[derive(Debug, Default, Args)]
-pub struct PriorFrom {
-    /// Take the prior from this NMEA log, at --at-time
-    #[arg(long, value_name = "FILE")]
-    pub nmea: Option<PathBuf>,
-    /// Time to look up in the log, with its zone, e.g. 2026-06-01T10:28:00+08:00; default: the capture's taken_at
-    #[arg(long, value_name = "T", requires = "nmea", value_parser = time)]
-    pub at_time: Option<Timestamp>,
-    /// Take the prior from the EXIF of this photo; with --segmenter the labels too, and the EXIF may be missing
-    #[arg(long, value_name = "FILE.jpg", conflicts_with = "nmea")]
-    pub photo: Option<PathBuf>,
-}
-
-impl PriorFrom {
-    /// Whether a log or photo is named.
-    pub fn is_given(&self) -> bool {
-        self.nmea.is_some() || self.photo.is_some()
-    }
-}
-
-/// Where the labels come from, when not from the label image of capture.json.
-#[derive(Debug, Default, Args)]
-pub struct LabelsFrom {
-    /// Make the labels of the --photo with this plugin, instead of reading the label image; "resurvey plugins list" lists
-    /// segmenters
-    #[arg(long, value_name = "NAME", requires = "photo")]
-    pub segmenter: Option<String>,
-}
-
-/// Arguments of `localize`.
-#[derive(Debug, Args)]
-pub struct Localize {
-    /// Map file
-    pub map: PathBuf,
-    /// capture.json
-    pub capture: PathBuf,
-    #[command(flatten)]
-    pub prior: PriorFrom,
-    #[command(flatten)]
-    pub labels: LabelsFrom,
-    /// VPS matcher; "resurvey plugins list" lists them
-    #[arg(long, default_value = "semantic")]
-    pub matcher: String,
-    #[command(flatten)]
-    pub settings: Settings,
-    /// Version, tag, date (@2026-03-01) or head
-    #[arg(long, default_value = "head", value_name = "REV")]
-    pub at: String,
-    /// Score every candidate on a view of the photo's full size, and say which is best by each metric: minutes for seconds
-    #[arg(long)]
-    pub exhaustive: bool,
-    /// Write the score of every candidate position as a picture
-    #[arg(long, value_name = "FILE.png")]
-    pub heatmap: Option<PathBuf>,
-    /// Mark the true pose in the heat map: a JSON file with a "pose"
-    #[arg(long, value_name = "FILE.json", requires = "heatmap")]
-    pub truth: Option<PathBuf>,
-    /// Write the result, which update and render read with --pose
-    #[arg(long, value_name = "POSE.json")]
-    pub out: Option<PathBuf>,
-}
-
-/// Arguments of `render`.
-#[derive(Debug, Args)]
-pub struct Render {
-    /// Map file
-    pub map: PathBuf,
-    /// capture.json: its camera, and its prior pose unless --pose is given
-    pub capture: Option<PathBuf>,
-    #[command(flatten)]
-    pub prior: PriorFrom,
-    /// Pose to draw from: a JSON file with a "pose"; without a capture the camera is 960x720 with a 120° diagonal
-    #[arg(long, value_name = "POSE.json")]
-    pub pose: Option<PathBuf>,
-    /// Version, tag, date or head
-    #[arg(long, default_value = "head", value_name = "REV")]
-    pub at: String,
-    /// Directory for class.png, depth.png, points.ply and view.json
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
-
-/// Arguments of `update`.
-#[derive(Debug, Args)]
-pub struct Update {
-    /// Map file
-    pub map: PathBuf,
-    /// One or more capture.json
-    #[arg(required = true)]
-    pub captures: Vec<PathBuf>,
-    #[command(flatten)]
-    pub prior: PriorFrom,
-    #[command(flatten)]
-    pub labels: LabelsFrom,
-    /// Take this pose instead of localizing, with one capture: a JSON file with a "pose"
-    #[arg(long, value_name = "POSE.json")]
-    pub pose: Option<PathBuf>,
-    /// VPS matcher
-    #[arg(long, default_value = "semantic")]
-    pub matcher: String,
-    /// Change detector
-    #[arg(long, default_value = "class-difference")]
-    pub detector: String,
-    /// Descriptor estimator
-    #[arg(long, default_value = "descriptors")]
-    pub estimator: String,
-    #[command(flatten)]
-    pub settings: Settings,
-    /// Do everything but write: the map stays as it is
-    #[arg(long)]
-    pub dry_run: bool,
-    /// Keep each change for review instead of committing it
-    #[arg(long, conflicts_with = "dry_run")]
-    pub propose: bool,
-    /// Keep each change for review until this many captures agree on it, and commit it then
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["dry_run", "propose"])]
-    pub confirm: Option<u64>,
-    /// A key of your own, with one capture: the same key again gives the version of the first time
-    #[arg(long, value_name = "KEY", conflicts_with_all = ["dry_run", "propose", "confirm"])]
-    pub idempotency_key: Option<String>,
-    /// Also write an HTML page per capture and an index.html that links them, whatever the run comes to
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
-    /// Keep the label image in the map as evidence
-    #[arg(long)]
-    pub keep_labels: bool,
-    /// Message of the version
-    #[arg(long, value_name = "TEXT")]
-    pub message: Option<String>,
-    /// Who commits
-    #[arg(long, value_name = "NAME", default_value = "resurvey")]
-    pub author: String,
-}
-
 /// A region of the map.
 #[derive(Debug, Args)]
 pub struct Region {
-    /// West, south, east, north: grid metres, or degrees with --wgs84
+    /// West, south, east, north: grid metres, e.g. 835500,817700,835700,817900, or degrees with --wgs84
     #[arg(long, value_name = "E0,N0,E1,N1", allow_hyphen_values = true, value_parser = numbers::<4>)]
     pub bbox: Option<[f64; 4]>,
-    /// Lowest and highest height, metres above the map's datum
+    /// Lowest and highest height, metres above the map's datum, e.g. 0,10; alone everywhere in plan
     #[arg(long, value_name = "H0,H1", allow_hyphen_values = true, value_parser = numbers::<2>)]
     pub height: Option<[f64; 2]>,
+    /// The region is in WGS84 degrees (bbox: longitude, latitude, longitude, latitude), and query answers in degrees too
+    #[arg(long)]
+    pub wgs84: bool,
 }
 
 /// Arguments of `query`.
@@ -337,30 +217,27 @@ pub struct Query {
     pub map: PathBuf,
     #[command(flatten)]
     pub region: Region,
-    /// A GeoJSON file with a polygon, grid metres, or degrees with --wgs84
+    /// A GeoJSON file with one polygon, e.g. block.geojson: grid metres, or degrees with --wgs84
     #[arg(long, value_name = "FILE.geojson", conflicts_with = "bbox")]
     pub polygon: Option<PathBuf>,
-    /// Centre of a circle, degrees
+    /// Centre of a circle, WGS84 degrees, e.g. 22.2978,114.1711
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, value_parser = numbers::<2>, requires = "radius", conflicts_with_all = ["bbox", "polygon"])]
     pub near: Option<[f64; 2]>,
-    /// Radius of the circle, metres
-    #[arg(long, value_name = "M", allow_hyphen_values = true, requires = "near")]
+    /// Radius of the circle, metres, e.g. 50
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = metres, requires = "near")]
     pub radius: Option<f64>,
-    /// Version, tag, date or head
+    /// Version, tag, date or head, e.g. 12 or @2026-03-01
     #[arg(long, default_value = "head", value_name = "REV")]
     pub at: String,
     /// What was there at this time as that version knows it, e.g. 2026-03-01: by when photos were taken, not committed
     #[arg(long, value_name = "T", value_parser = moment)]
     pub observed_at: Option<Timestamp>,
-    /// Only this class; may be given again
+    /// Only this class, e.g. banner; may be given again
     #[arg(long, value_name = "NAME")]
     pub class: Vec<String>,
-    /// Coordinates in and out are WGS84 degrees
-    #[arg(long)]
-    pub wgs84: bool,
-    /// Form of the answer
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: QueryFormat,
+    /// Form of the answer [default: table, or json with --json]
+    #[arg(long, value_enum)]
+    pub format: Option<QueryFormat>,
 }
 
 /// Form of a query's answer.
@@ -382,13 +259,15 @@ pub struct Log {
     /// Map file
     pub map: PathBuf,
     /// Only versions that changed this feature
+    #[arg(value_parser = number)]
     pub fid: Option<u64>,
     #[command(flatten)]
     pub region: Region,
-    /// Only versions that this plugin took part in: the SHA-256 of its build (8 digits or more), NAME or NAME@VERSION
+    /// Only versions that this plugin took part in: the SHA-256 of its build (8 digits or more), NAME or NAME@VERSION, e.g.
+    /// semantic@0.1.0
     #[arg(long, value_name = "BUILD")]
     pub by_plugin: Option<PluginBuild>,
-    /// At most this many versions
+    /// At most this many versions, e.g. 10
     #[arg(long, short = 'n', value_name = "N")]
     pub limit: Option<usize>,
 }
@@ -399,6 +278,7 @@ pub struct Why {
     /// Map file
     pub map: PathBuf,
     /// Feature id, as query prints it
+    #[arg(value_parser = number)]
     pub fid: u64,
 }
 
@@ -416,6 +296,9 @@ pub struct Replay {
     /// Also with other builds of the plugins than the recorded ones
     #[arg(long)]
     pub any_build: bool,
+    /// Where a file that a setting names lies now, e.g. segnet.weights=models/city.onnx; may be given again
+    #[arg(long, value_name = "PLUGIN.KEY=PATH")]
+    pub file: Vec<String>,
 }
 
 /// Arguments of `apply`.
@@ -434,12 +317,12 @@ pub struct Apply {
 pub struct Export {
     /// Map file
     pub map: PathBuf,
-    /// File to write; its suffix says the format: .glb
+    /// File to write; its suffix says the format: .glb, or .gltf with a .bin beside it
     pub out: PathBuf,
-    /// Version, tag, date or head
+    /// Version, tag, date or head, e.g. 12 or @2026-03-01
     #[arg(long, default_value = "head", value_name = "REV")]
     pub at: String,
-    /// Only what differs between two versions: added green, removed red, changed yellow
+    /// Only what differs between two versions, e.g. 3..head: added green, removed red, changed yellow
     #[arg(long, value_name = "REV..REV", conflicts_with = "at")]
     pub diff: Option<String>,
     #[command(flatten)]
@@ -471,10 +354,14 @@ pub struct Man {
     pub out: PathBuf,
 }
 
-/// Parses a time with its zone.
-fn time(text: &str) -> Result<Timestamp, String> {
-    let expected = "expected a time with its zone, such as 2026-06-01T10:28:00+08:00";
-    text.parse().map_err(|_| format!("{expected}, found {text:?}"))
+/// Parses the number of a feature or proposal.
+fn number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a number, found {text:?}"))
+}
+
+/// Parses a length; whether it can be one is for the command to say.
+fn metres(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("expected metres, found {text:?}"))
 }
 
 /// Parses a date, or a time with its zone.
@@ -503,6 +390,37 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    /// Every command with its names, the one of `command` and those within it.
+    fn all(command: &clap::Command, within: &str) -> Vec<(String, clap::Command)> {
+        let name = format!("{within} {}", command.get_name());
+        let below = command.get_subcommands().flat_map(|below| all(below, &name));
+        std::iter::once((name.clone(), command.clone())).chain(below).collect()
+    }
+
+    #[test]
+    fn every_option_that_takes_a_value_has_an_example_of_one() {
+        let of_files = ["FILE", "DIR", "TEXT", "POSE.json", "CAPTURE.json", "FILE.json", "FILE.jpg", "FILE.png"];
+        for (name, command) in all(&Cli::command(), "") {
+            // Theirs is another page.
+            if name.contains("plugins") || name.contains("eval") {
+                continue;
+            }
+            let mut silent = Vec::new();
+            for option in command.get_opts() {
+                let takes = option.get_value_names().unwrap_or_default();
+                let is_file = takes.iter().any(|value| of_files.contains(&value.as_str()));
+                let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+                let has_example = help.contains("e.g.") || !option.get_default_values().is_empty();
+                let is_told = has_example || is_file || !option.get_possible_values().is_empty();
+                let takes_value = option.get_action().takes_values();
+                if takes_value && !is_told {
+                    silent.push(format!("--{}: {help}", option.get_id()));
+                }
+            }
+            assert!(silent.is_empty(), "{name}: {silent:#?}");
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Where results and messages go: results to standard output, everything else to standard error.
 
 use crate::failure::Failure;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::interrupt::Interrupt;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use resurvey_core::localize::Listener;
 use resurvey_schema::service::Level;
 use serde::Serialize;
@@ -15,12 +16,29 @@ pub struct Console<'a> {
     err: &'a mut dyn Write,
     is_json: bool,
     shows_progress: bool,
+    interrupt: Interrupt,
+    done: Vec<String>,
 }
 
 impl<'a> Console<'a> {
     /// A console; `is_json` is the `--json` option.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write, is_json: bool, shows_progress: bool) -> Self {
-        Self { out, err, is_json, shows_progress }
+        Self { out, err, is_json, shows_progress, interrupt: Interrupt::default(), done: Vec::new() }
+    }
+
+    /// Lets `interrupt` end what [`listens`](Self::listen).
+    pub fn interrupted_by(self, interrupt: Interrupt) -> Self {
+        Self { interrupt, ..self }
+    }
+
+    /// From now on the command ends by itself where the user asks for it, and not in the middle of something.
+    pub fn listen(&self) {
+        self.interrupt.listen();
+    }
+
+    /// An error where the user has asked to end.
+    pub fn go_on(&self) -> Result<(), Failure> {
+        if self.interrupt.is_asked() { Err(Failure::interrupted("before the next step")) } else { Ok(()) }
     }
 
     /// Whether results are JSON.
@@ -49,16 +67,28 @@ impl<'a> Console<'a> {
         let _ = writeln!(self.err, "{text}");
     }
 
+    /// Notes what is on disk now, for a user who cannot be told the result.
+    pub fn did(&mut self, what: impl std::fmt::Display) {
+        self.done.push(what.to_string());
+    }
+
+    /// What was noted.
+    pub fn take_done(self) -> Vec<String> {
+        self.done
+    }
+
     /// A stage with a progress bar, when standard error is a terminal.
     pub fn stage(&self, name: &'static str) -> Stage {
         let target = if self.shows_progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1000), target).with_message(name);
+        // What ends early leaves no bar behind.
+        let bar = bar.with_finish(ProgressFinish::AndClear);
         let style = ProgressStyle::with_template("{msg:10} [{bar:40}] {percent:3} % {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
         if self.shows_progress {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Stage { bar, lines: Mutex::default(), start: Instant::now() }
+        Stage { bar, lines: Mutex::default(), start: Instant::now(), interrupt: self.interrupt.clone() }
     }
 
     /// Ends `stage`, prints what plugins said in it, and returns its duration in milliseconds.
@@ -82,12 +112,15 @@ pub struct Stage {
     bar: ProgressBar,
     lines: Mutex<Vec<String>>,
     start: Instant,
+    interrupt: Interrupt,
 }
 
 impl Listener for Stage {
     fn log(&self, level: Level, text: &str) {
         if level != Level::Debug {
-            let line = if level == Level::Warning { format!("warning: {text}") } else { text.to_owned() };
+            // What a plugin says is shown, and does not speak to the terminal.
+            let text = text.replace(char::is_control, " ");
+            let line = if level == Level::Warning { format!("warning: {text}") } else { text };
             self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(line);
         }
     }
@@ -97,6 +130,6 @@ impl Listener for Stage {
     }
 
     fn cancelled(&self) -> bool {
-        false
+        self.interrupt.is_asked()
     }
 }

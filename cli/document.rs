@@ -6,8 +6,7 @@ use resurvey_core::localize::Located;
 use resurvey_core::plugin::PluginInfo;
 use resurvey_core::update::Change;
 use resurvey_core::version::{Feature, FeatureState, PluginUse, VersionRecord, descriptor_to_file};
-use resurvey_schema::changes::DescriptorFile;
-use resurvey_schema::{ClassTable, Rejection};
+use resurvey_schema::{ClassTable, Descriptor, Rejection};
 use serde_json::{Map, Value, json};
 
 /// The document of `localize --json`.
@@ -52,21 +51,15 @@ pub fn gates(gates: &[resurvey_core::version::Gate]) -> Value {
 
 /// One entry of `changes`.
 pub fn change(change: &Change, added_fid: Option<u64>, classes: &ClassTable) -> Value {
-    let file = |descriptor| descriptor_to_file(descriptor, classes);
-    match change {
-        Change::Add(after) => {
-            let after = file(after);
-            json!({ "op": "add", "fid": added_fid, "class": after.class, "before": null, "after": after })
-        }
-        Change::Modify { fid, before, after } => {
-            let after = file(after);
-            json!({ "op": "modify", "fid": fid, "class": after.class, "before": file(before), "after": after })
-        }
-        Change::Remove { fid, before } => {
-            let before = file(before);
-            json!({ "op": "remove", "fid": fid, "class": before.class, "before": before, "after": null })
-        }
-    }
+    let side = |descriptor: &Descriptor| of_descriptor(descriptor, classes);
+    let (op, fid, before, after) = match change {
+        Change::Add(after) => ("add", added_fid, None, Some(after)),
+        Change::Modify { fid, before, after } => ("modify", Some(*fid), Some(before), Some(after)),
+        Change::Remove { fid, before } => ("remove", Some(*fid), Some(before), None),
+    };
+    let (before, after) = (before.map(side), after.map(side));
+    let class = after.as_ref().or(before.as_ref()).map(|state| state["class"].clone());
+    json!({ "op": op, "fid": fid, "class": class, "before": before, "after": after })
 }
 
 /// One entry of `rejections`.
@@ -140,27 +133,32 @@ pub fn feature(feature: &Feature, classes: &ClassTable) -> Result<Map<String, Va
     fields.insert("fid".to_owned(), json!(feature.fid.0));
     fields.insert("from".to_owned(), json!(feature.from.0));
     fields.insert("to".to_owned(), json!(feature.to.map(|version| version.0)));
-    fields.insert("kind".to_owned(), json!(feature.state.kind_name()));
     for (key, value) in state(&feature.state, classes)? {
         fields.insert(key, value);
     }
     Ok(fields)
 }
 
-/// The fields of a state: those of a descriptor, or name, geometry and box of an object.
+/// The fields of a state: its kind, and those of a descriptor, or name, geometry and box of an object.
 pub fn state(state: &FeatureState, classes: &ClassTable) -> Result<Map<String, Value>, Failure> {
-    let value = match state {
-        FeatureState::Descriptor(descriptor) => {
-            let file: DescriptorFile = descriptor_to_file(descriptor, classes);
-            serde_json::to_value(file)?
-        }
+    match state {
+        FeatureState::Descriptor(descriptor) => Ok(of_descriptor(descriptor, classes)),
         FeatureState::Object { name, geometry, bounds } => {
             let [min, max] = bounds.corners();
-            json!({ "class": null, "name": name, "geometry": geometry.to_string(), "min": min, "max": max })
+            let value = json!({
+                "kind": state.kind_name(), "class": null, "name": name, "geometry": geometry.to_string(),
+                "min": min, "max": max,
+            });
+            Ok(serde_json::from_value(value)?)
         }
-    };
-    match value {
-        Value::Object(fields) => Ok(fields),
-        _ => Ok(Map::new()),
     }
+}
+
+fn of_descriptor(descriptor: &Descriptor, classes: &ClassTable) -> Map<String, Value> {
+    let kind = FeatureState::Descriptor(descriptor.clone()).kind_name();
+    let mut fields = Map::from_iter([("kind".to_owned(), json!(kind))]);
+    if let Value::Object(more) = json!(descriptor_to_file(descriptor, classes)) {
+        fields.extend(more);
+    }
+    fields
 }

@@ -1,4 +1,5 @@
-//! Errors with their exit code: 2 usage, 10 input or output file, 11 no such thing, 12 plugin, 13 map file, 21 conflict.
+//! Errors with their exit code: 2 usage, 10 input or output file, 11 no such thing, 12 plugin, 13 map file, 21 conflict,
+//! 130 interrupted.
 
 use resurvey_core::capture::CaptureError;
 use resurvey_core::crs::CrsError;
@@ -33,6 +34,8 @@ pub const NOTHING: u8 = 20;
 pub const CONFLICT: u8 = 21;
 /// Not an error: the pose is not reliable.
 pub const UNRELIABLE: u8 = 22;
+/// The user asked to end: 128 and the number of the signal, as shells say it.
+pub const INTERRUPTED: u8 = 130;
 
 /// Why a command ended, and with which code.
 #[derive(Debug)]
@@ -59,14 +62,48 @@ impl Failure {
         Self::new(INPUT, anyhow::anyhow!("{text}"))
     }
 
+    /// The user asked to end, and so it did in the step that `reason` tells.
+    pub fn interrupted(reason: impl fmt::Display) -> Self {
+        Self::new(INTERRUPTED, anyhow::anyhow!("interrupted, {reason}; what was not finished is not in the map"))
+    }
+
+    /// A conflict with more `words`, and more keys of each feature in the list.
+    pub fn conflict(error: &CommitError, words: &str, states: Vec<Value>) -> Self {
+        let next = "look at the features with \"resurvey query\" and work the change out again";
+        let failure = Self::new(CONFLICT, anyhow::anyhow!("{error}{words}; {next}"));
+        let CommitError::Conflict { base, head, changed, looked_at } = error else { return failure };
+        let mut document = conflict(*base, *head, changed, looked_at);
+        for (index, state) in states.into_iter().enumerate() {
+            if let (Some(change), Value::Object(state)) = (document["conflicts"][index].as_object_mut(), state) {
+                change.extend(state);
+            }
+        }
+        failure.with_document(document)
+    }
+
     /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
-        if self.code == MAP || self.to_string().contains(&place) {
+        let is_of_map =
+            matches!(self.error.downcast_ref(), Some(StoreError::Busy { .. } | StoreError::Internal { .. }));
+        if self.code == MAP || is_of_map || names(&self.to_string(), &place) {
             self
         } else {
             Self { error: self.error.context(place), ..self }
         }
+    }
+
+    /// The same with what machines are told.
+    pub fn with_document(self, document: Value) -> Self {
+        Self { document: Some(Box::new(document)), ..self }
+    }
+
+    /// The same with one more key in what machines are told, if they are told something.
+    pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
+        if let Some(document) = &mut self.document {
+            document[key] = value.into();
+        }
+        self
     }
 
     /// What machines are told, once.
@@ -77,12 +114,6 @@ impl Failure {
     /// The exit code.
     pub fn code(&self) -> u8 {
         self.code
-    }
-
-    /// Whether the reader of the output went away, which is no failure.
-    pub fn is_closed_pipe(&self) -> bool {
-        let is_closed = |error: &std::io::Error| error.kind() == std::io::ErrorKind::BrokenPipe;
-        self.error.downcast_ref::<std::io::Error>().is_some_and(is_closed)
     }
 }
 
@@ -97,6 +128,12 @@ impl fmt::Display for Failure {
         }
         formatter.write_str(&said)
     }
+}
+
+/// Whether `message` says that what follows is about the file at `place`.
+fn names(message: &str, place: &str) -> bool {
+    let begins = message.strip_prefix(place).is_some_and(|rest| rest.starts_with([':', ',', ' ']));
+    begins || message.contains(&format!(": {place}: "))
 }
 
 macro_rules! failure_from {
@@ -158,20 +195,25 @@ impl From<StoreError> for Failure {
             StoreError::Revision(_) | StoreError::TagName { .. } => USAGE,
             _ => INPUT,
         };
-        Self::new(code, error)
+        let document = match &error {
+            StoreError::Busy { .. } => Some(json!({ "decision": "busy", "version": null })),
+            StoreError::ProposalDecided { id, status } => {
+                Some(json!({ "decision": "conflict", "id": id, "status": status, "version": null }))
+            }
+            _ => None,
+        };
+        let failure = Self::new(code, error);
+        document.into_iter().fold(failure, Self::with_document)
     }
 }
 
 impl From<CommitError> for Failure {
     fn from(error: CommitError) -> Self {
         match error {
-            CommitError::Conflict { base, head, ref changed, ref looked_at } => {
-                let next = "look at the features with \"resurvey query\" and work the change out again";
-                let document = conflict(base, head, changed, looked_at);
-                let failure = Self::new(CONFLICT, anyhow::anyhow!("{error}; {next}"));
-                Self { document: Some(Box::new(document)), ..failure }
-            }
-            CommitError::NothingToRevert { .. } => Self::new(NOTHING, error),
+            CommitError::Conflict { .. } => Self::conflict(&error, "", Vec::new()),
+            CommitError::NothingToRevert { version, .. } => Self::new(NOTHING, error).with_document(json!({
+                "decision": "nothing", "reverts": version.0, "version": null, "added": 0, "modified": 0, "removed": 0,
+            })),
             CommitError::OtherRequest { .. } | CommitError::OtherProposal { .. } => Self::new(CONFLICT, error),
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
@@ -180,7 +222,7 @@ impl From<CommitError> for Failure {
 }
 
 /// The document of a conflict.
-fn conflict(base: VersionId, head: VersionId, changed: &[ConflictingChange], looked_at: &[VersionId]) -> Value {
+pub fn conflict(base: VersionId, head: VersionId, changed: &[ConflictingChange], looked_at: &[VersionId]) -> Value {
     let one = |change: &ConflictingChange| {
         json!({
             "fid": change.fid.0,
@@ -218,5 +260,25 @@ impl From<UpdateError> for Failure {
             UpdateError::Geometry { .. } => Self::new(MAP, error),
             _ => Self::new(INPUT, error),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_once_however_short_its_name() {
+        let about = |text: &str, file: &str| Failure::input(text).about(Path::new(file)).to_string();
+        assert_eq!(about("expected a header", "a"), "a: expected a header");
+        assert_eq!(about("a: expected a header", "a"), "a: expected a header");
+        assert_eq!(about("a, line 3: expected a header", "a"), "a, line 3: expected a header");
+        assert_eq!(about("banner: expected a header", "ban"), "ban: banner: expected a header");
+    }
+
+    #[test]
+    fn what_keeps_the_map_busy_is_not_the_doing_of_a_file() {
+        let busy = Failure::from(StoreError::Busy { path: "city.rsv".into() });
+        assert!(busy.about(Path::new("set.jsonl")).to_string().starts_with("city.rsv: another process"));
     }
 }

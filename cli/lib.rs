@@ -3,10 +3,15 @@
 
 mod args;
 mod commands;
+mod conflict;
 mod console;
 mod document;
 mod failure;
+mod interrupt;
 mod matching;
+mod out_file;
+mod output;
+mod plain;
 mod prior;
 mod region;
 mod report;
@@ -21,7 +26,10 @@ use commands::{
     query, render, replay, revert, tag, update,
 };
 use console::Console;
-use failure::{Failure, USAGE};
+use failure::{Failure, INPUT, INTERRUPTED, USAGE};
+pub use interrupt::Interrupt;
+use output::Output;
+use plain::plain_lines;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -42,6 +50,8 @@ pub struct Host {
     pub shows_progress: bool,
     /// The `resurvey` program, which runs plugins from files in processes of their own; without it they are refused.
     pub program: Option<PathBuf>,
+    /// How the user ends a run before it has ended.
+    pub interrupt: Interrupt,
 }
 
 /// The same, for a program that says more of itself.
@@ -55,34 +65,40 @@ where
         Err(error) => return explain(&error, out, err),
     };
     cli.plugins.program = host.program;
-    let mut console = Console::new(out, err, cli.json, host.shows_progress);
+    let interrupt = host.interrupt;
+    let mut output = Output::new(out);
+    let mut console = Console::new(&mut output, err, cli.json, host.shows_progress).interrupted_by(interrupt.clone());
     let result = dispatch(&cli, &mut console)
-        .or_else(|failure| tell(failure, &mut console))
-        .and_then(|code| Ok(console.out().flush().map(|()| code)?));
-    exit_code(result, err)
+        .map_err(|failure| match failure.code() {
+            code if interrupt.is_asked() && code != INTERRUPTED => Failure::interrupted(failure),
+            _ => failure,
+        })
+        .map_err(|failure| tell(failure, &mut console));
+    let done = console.take_done();
+    exit_code(result, &done, output, err)
 }
 
 /// Prints the document of a failure that has one, for machines.
-fn tell(mut failure: Failure, console: &mut Console<'_>) -> Result<u8, Failure> {
-    if let Some(document) = failure.take_document().filter(|_| console.is_json()) {
-        console.document(&document)?;
-        console.out().flush()?;
+fn tell(mut failure: Failure, console: &mut Console<'_>) -> Failure {
+    match failure.take_document().filter(|_| console.is_json()) {
+        Some(document) => console.document(&document).err().unwrap_or(failure),
+        None => failure,
     }
-    Err(failure)
 }
 
-/// The code of a result; says on standard error why it is none.
-fn exit_code(result: Result<u8, Failure>, err: &mut dyn Write) -> u8 {
-    match result {
-        Ok(code) => code,
-        // The reader has what it wanted.
-        Err(failure) if failure.is_closed_pipe() => 0,
-        Err(failure) => {
-            // A closed standard error is nobody's loss.
-            let _ = writeln!(err, "resurvey: {failure}");
-            failure.code()
-        }
-    }
+/// The code of a result; says on standard error why it is none, and what was `done` where `output` could not say it. A
+/// closed standard error is nobody's loss.
+fn exit_code(result: Result<u8, Failure>, done: &[String], mut output: Output<'_>, err: &mut dyn Write) -> u8 {
+    let code = result.unwrap_or_else(|failure| {
+        // On a terminal what came of the run stands before why it ended. This stream tells its failures at its end.
+        let _ = output.flush();
+        let _ = writeln!(err, "resurvey: {}", plain_lines(&failure.to_string()));
+        failure.code()
+    });
+    let Err(error) = output.finish() else { return code };
+    let done: String = done.iter().map(|done| format!("{done}; ")).collect();
+    let _ = writeln!(err, "resurvey: {done}standard output: {error}");
+    if code == 0 { INPUT } else { code }
 }
 
 /// Prints help to standard output, a usage error to standard error.
@@ -92,8 +108,9 @@ fn explain(error: &clap::Error, out: &mut dyn Write, err: &mut dyn Write) -> u8 
         let _ = write!(err, "{text}");
         return USAGE;
     }
-    let written = write!(out, "{text}").and_then(|()| out.flush());
-    exit_code(written.map(|()| 0).map_err(Failure::from), err)
+    let mut output = Output::new(out);
+    let written = write!(output, "{text}");
+    exit_code(written.map(|()| 0).map_err(Failure::from), &[], output, err)
 }
 
 fn dispatch(cli: &Cli, console: &mut Console<'_>) -> Result<u8, Failure> {

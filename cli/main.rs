@@ -1,7 +1,7 @@
 //! The `resurvey` binary.
 #![forbid(unsafe_code)]
 
-use resurvey::Host;
+use resurvey::{Host, Interrupt};
 use resurvey_core::plugin::{SERVE, serve};
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -14,7 +14,10 @@ fn main() -> ExitCode {
     let mut out = std::io::BufWriter::new(std::io::stdout());
     let mut err = std::io::stderr();
     // Where the system does not say what is running, plugins from files say so.
-    let host = Host { shows_progress: err.is_terminal(), program: std::env::current_exe().ok() };
+    let program = std::env::current_exe().ok();
+    // Without a handler Ctrl-C ends the program as ever.
+    let interrupt = Interrupt::of_terminal().unwrap_or_default();
+    let host = Host { shows_progress: err.is_terminal(), program, interrupt };
     let code = resurvey::run_as(host, std::env::args_os(), &mut out, &mut err);
     ExitCode::from(code)
 }

@@ -1,10 +1,11 @@
 //! Regions of the map as the command line names them.
 
 use crate::args::Region;
-use crate::failure::Failure;
-use geo::{Contains, Coord, LineString, Polygon};
+use crate::console::Console;
+use crate::failure::{Failure, MAP};
+use geo::{Contains, Coord, Distance, Euclidean, Intersects, LineString, Point, Polygon};
 use geojson::{GeoJson, Value as Geometry};
-use resurvey_core::crs::Crs;
+use resurvey_core::crs::{Crs, CrsError};
 use resurvey_core::version::{BoxMm, FeatureState};
 use resurvey_schema::{Descriptor, GridPoint, Wgs84};
 use serde_json::{Value, json};
@@ -13,14 +14,12 @@ use std::path::Path;
 /// Heights of a region that names none, metres: below the deepest cavern, above the highest mast.
 const HEIGHTS_M: [f64; 2] = [-10_000.0, 10_000.0];
 
-/// The box of `--bbox` and `--height`; `None` without a bbox.
-pub fn bbox(region: &Region, crs: Crs, is_wgs84: bool) -> Result<Option<BoxMm>, Failure> {
+/// The box of `--bbox` and `--height`; `None` without either.
+pub fn bbox(region: &Region, crs: Crs) -> Result<Option<BoxMm>, Failure> {
     let heights = checked_heights(region)?;
     let Some([west, south, east, north]) = region.bbox else {
-        return match region.height {
-            Some(_) => Err(Failure::usage("--height needs a region in plan; give --bbox, --polygon or --near")),
-            None => Ok(None),
-        };
+        let everywhere = [-BoxMm::LIMIT_M, BoxMm::LIMIT_M].map(|metres| GridPoint::new(metres, metres, 0.0));
+        return region.height.map(|_| around(&everywhere, heights)).transpose();
     };
     for (low, high, axis) in [(west, east, "E0,E1"), (south, north, "N0,N1")] {
         if low > high {
@@ -29,9 +28,13 @@ pub fn bbox(region: &Region, crs: Crs, is_wgs84: bool) -> Result<Option<BoxMm>, 
             )));
         }
     }
-    let corners = if is_wgs84 {
+    let corners = if region.wgs84 {
         let corners = [(south, west), (south, east), (north, west), (north, east)];
-        corners.iter().map(|(lat, lon)| grid_point(crs, *lat, *lon)).collect::<Result<Vec<_>, _>>()?
+        let order = "--bbox with --wgs84 is longitude,latitude,longitude,latitude";
+        let point = |(lat, lon): &(f64, f64)| {
+            grid_point(crs, *lat, *lon).map_err(|error| Failure::usage(format!("{error}; {order}")))
+        };
+        corners.iter().map(point).collect::<Result<Vec<_>, _>>()?
     } else {
         vec![GridPoint::new(west, south, 0.0), GridPoint::new(east, north, 0.0)]
     };
@@ -58,27 +61,32 @@ pub fn grid_point(crs: Crs, latitude_deg: f64, longitude_deg: f64) -> Result<Gri
     Ok(crs.grid_from_latitude_longitude(latitude_deg, longitude_deg, 0.0)?)
 }
 
-/// WGS84 position of a grid point.
-pub fn wgs84(crs: Crs, point: GridPoint) -> Result<Wgs84, Failure> {
-    Ok(crs.wgs84_from_grid(point)?)
+/// WGS84 position of a grid point; `None` outside the area of use of the map's system.
+pub fn wgs84(crs: Crs, point: GridPoint) -> Result<Option<Wgs84>, Failure> {
+    match crs.wgs84_from_grid(point) {
+        Ok(position) => Ok(Some(position)),
+        Err(CrsError::GridOutside { .. }) => Ok(None),
+        Err(error) => Err(Failure::new(MAP, error)),
+    }
 }
 
 /// The GeoJSON geometry of a state in WGS84: a closed ring for a rectangle, a point for an object on the ground, the box
-/// in plan for an object of the model.
-pub fn geojson(crs: Crs, state: &FeatureState) -> Result<Value, Failure> {
-    let position = |point: GridPoint| -> Result<[f64; 3], Failure> {
-        let position = wgs84(crs, point)?;
-        Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
+/// in plan for an object of the model; `None` where a position is outside the area of use of the map's system.
+pub fn geojson(crs: Crs, state: &FeatureState) -> Result<Option<Value>, Failure> {
+    let position = |point: GridPoint| -> Result<Option<[f64; 3]>, Failure> {
+        let to_array = |found: Wgs84| [found.longitude_deg, found.latitude_deg, found.ellipsoidal_height_m];
+        Ok(wgs84(crs, point)?.map(to_array))
     };
-    let ring = |corners: &[GridPoint]| -> Result<Value, Failure> {
+    let ring = |corners: &[GridPoint]| -> Result<Option<Value>, Failure> {
         let closed = corners.iter().chain(corners.first());
-        let ring = closed.map(|corner| position(*corner)).collect::<Result<Vec<_>, _>>()?;
-        Ok(json!({ "type": "Polygon", "coordinates": [ring] }))
+        let ring = closed.map(|corner| position(*corner)).collect::<Result<Option<Vec<_>>, _>>()?;
+        Ok(ring.map(|ring| json!({ "type": "Polygon", "coordinates": [ring] })))
     };
     match state {
         FeatureState::Descriptor(Descriptor::Material(material)) => ring(&material.corners),
         FeatureState::Descriptor(Descriptor::Dynamic(dynamic)) => {
-            Ok(json!({ "type": "Point", "coordinates": position(dynamic.position)? }))
+            let place = position(dynamic.position)?;
+            Ok(place.map(|place| json!({ "type": "Point", "coordinates": place })))
         }
         FeatureState::Object { bounds, .. } => {
             let [low, high] = bounds.corners();
@@ -86,6 +94,15 @@ pub fn geojson(crs: Crs, state: &FeatureState) -> Result<Value, Failure> {
             let corners = [(west, south), (east, south), (east, north), (west, north)];
             ring(&corners.map(|(e, n)| GridPoint::new(e, n, low.height_m)))
         }
+    }
+}
+
+/// Says how many of the features that were printed have no position in degrees.
+pub fn tell_unplaced(count: usize, crs: Crs, console: &mut Console<'_>) {
+    if count > 0 {
+        console.message(&format!(
+            "warning: {count} features have no position in degrees: they lie outside the area of use of {crs}"
+        ));
     }
 }
 
@@ -107,10 +124,16 @@ impl Shape {
     pub fn read_polygon(path: &Path, crs: Crs, is_wgs84: bool) -> Result<Self, Failure> {
         let place = path.display();
         let text = std::fs::read_to_string(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
-        let document: GeoJson = text.parse().map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        let document: GeoJson = text.parse().map_err(|error| {
+            Failure::input(format!("{place}: expected one GeoJSON polygon, found something else: {error}"))
+        })?;
         let rings = match geometry(document) {
-            Some(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
-            _ => return Err(Failure::input(format!("{place}: expected one GeoJSON polygon"))),
+            Ok(Geometry::Polygon(rings)) if !rings.is_empty() => rings,
+            other => {
+                let found =
+                    other.map_or_else(|found| found, |geometry| format!("a {} without rings", geometry.type_name()));
+                return Err(Failure::input(format!("{place}: expected one GeoJSON polygon, found {found}")));
+            }
         };
         let mut lines = Vec::new();
         for ring in rings {
@@ -156,29 +179,45 @@ impl Shape {
     /// Whether the point lies in it, in plan.
     pub fn contains(&self, point: &GridPoint) -> bool {
         match self {
-            Self::Polygon(polygon) => polygon.contains(&Coord { x: point.easting_m, y: point.northing_m }),
+            Self::Polygon(polygon) => polygon.contains(&in_plan(point)),
             Self::Circle { centre, radius_m } => centre.plan_distance_m(point) <= *radius_m,
         }
     }
 
-    /// Whether a descriptor belongs to it: its centre or ground contact, or one of its corners, lies in it.
+    /// Whether a descriptor belongs to it: its ground contact, or any part of its rectangle, lies in it in plan.
     pub fn holds(&self, descriptor: &Descriptor) -> bool {
-        let corners: &[GridPoint] = match descriptor {
-            Descriptor::Material(material) => &material.corners,
-            Descriptor::Dynamic(_) => &[],
-        };
-        self.contains(&descriptor.anchor()) || corners.iter().any(|corner| self.contains(corner))
+        let Descriptor::Material(material) = descriptor else { return self.contains(&descriptor.anchor()) };
+        let corners: LineString<f64> =
+            material.corners.iter().map(in_plan).chain([in_plan(&material.corners[0])]).collect();
+        // On a wall it is a line in plan, and has no inside.
+        let footprint = Polygon::new(corners, Vec::new());
+        match self {
+            Self::Polygon(polygon) => polygon.intersects(footprint.exterior()) || polygon.intersects(&footprint),
+            Self::Circle { centre, radius_m } => {
+                let centre = Point(in_plan(centre));
+                footprint.contains(&centre) || Euclidean.distance(&centre, footprint.exterior()) <= *radius_m
+            }
+        }
     }
 }
 
-fn geometry(document: GeoJson) -> Option<Geometry> {
+fn in_plan(point: &GridPoint) -> Coord<f64> {
+    Coord { x: point.easting_m, y: point.northing_m }
+}
+
+/// The one polygon in a document, or what is there instead.
+fn geometry(document: GeoJson) -> Result<Geometry, String> {
+    let of = |geometry: Option<geojson::Geometry>| match geometry.map(|geometry| geometry.value) {
+        Some(polygon @ Geometry::Polygon(_)) => Ok(polygon),
+        Some(other) => Err(format!("a {}", other.type_name())),
+        None => Err("a feature without a geometry".to_owned()),
+    };
     match document {
-        GeoJson::Geometry(geometry) => Some(geometry.value),
-        GeoJson::Feature(feature) => feature.geometry.map(|geometry| geometry.value),
-        GeoJson::FeatureCollection(collection) => {
-            let mut features = collection.features.into_iter();
-            let only = features.next()?;
-            if features.next().is_some() { None } else { only.geometry.map(|geometry| geometry.value) }
-        }
+        GeoJson::Geometry(geometry) => of(Some(geometry)),
+        GeoJson::Feature(feature) => of(feature.geometry),
+        GeoJson::FeatureCollection(mut collection) => match collection.features.len() {
+            1 => of(collection.features.remove(0).geometry),
+            count => Err(format!("a collection of {count} features")),
+        },
     }
 }

@@ -1,7 +1,7 @@
 //! Plugins and their settings as the command line chooses them.
 
 use crate::args::{PluginSearch, Settings};
-use crate::commands::plugins::installed::{ALLOWED, directories};
+use crate::commands::plugins::installed::{allowed_in, builds_in};
 use crate::failure::Failure;
 use crate::matching::with_members;
 use anyhow::anyhow;
@@ -9,7 +9,9 @@ use resurvey_core::localize::{FUSED, GATE_KEYS, GateLimits, SearchLimits};
 use resurvey_core::plugin::{Assignment, CrashLog, Digest, Isolation, Plugin, PluginError, PluginInfo, Registry};
 use resurvey_core::version::{ModelFile, PluginUse, SearchRange};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Colon-separated directories of plugin libraries.
@@ -26,12 +28,18 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
     let given = search.allow_plugin.iter().map(|text| text.parse::<Digest>());
     let mut allowed = given.collect::<Result<Vec<_>, _>>().map_err(Failure::usage)?;
     let data = data_directory();
-    if let Some(list) = data.as_ref().and_then(|data| std::fs::read_to_string(data.join(ALLOWED)).ok()) {
-        allowed.extend(list.lines().filter_map(|line| line.split_whitespace().next()?.parse::<Digest>().ok()));
+    if let Some(data) = &data {
+        allowed.extend(allowed_in(data)?);
     }
     let mut registry = Registry::new(allowed);
     if !search.in_process {
-        registry.isolate(isolation(search, data.as_deref()));
+        registry.isolate(isolation(search));
+    }
+    if let Some(data) = &data {
+        registry.count_crashes(CrashLog::new(&data.join(CRASHED)));
+    }
+    if let Some(program) = &search.program {
+        registry.of_program(program_digest(program)?);
     }
     for declaration in [
         resurvey_semantic::plugin(),
@@ -47,10 +55,9 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
         registry.add_builtin(declaration)?;
     }
     let from_path = std::env::var_os(PLUGIN_PATH).map(|path| std::env::split_paths(&path).collect::<Vec<_>>());
+    // Each installed build has a directory of its own.
+    let installed = data.as_deref().map(|data| builds_in(data).0).unwrap_or_default();
     let plugins = data.map(|data| data.join("plugins")).filter(|directory| directory.is_dir());
-    // Each installed library has a directory of its own.
-    let installed: Vec<PathBuf> =
-        plugins.iter().flat_map(|all| directories(all)).map(|(_, directory)| directory).collect();
     let own = plugins.into_iter().chain(installed);
     for directory in search.plugin_dir.iter().cloned().chain(from_path.into_iter().flatten()).chain(own) {
         registry.add_directory(&directory);
@@ -58,13 +65,31 @@ pub fn registry(search: &PluginSearch) -> Result<Registry, Failure> {
     Ok(registry)
 }
 
+/// The digest of the program at `path`, which is worked out once.
+fn program_digest(path: &Path) -> Result<Digest, Failure> {
+    static KNOWN: Mutex<BTreeMap<PathBuf, Digest>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(digest) = known.get(path) {
+        return Ok(*digest);
+    }
+    let digest = file_digest(path)?;
+    known.insert(path.to_owned(), digest);
+    Ok(digest)
+}
+
+/// The digest of a file of any size.
+fn file_digest(path: &Path) -> Result<Digest, Failure> {
+    let digest = std::fs::File::open(path).and_then(Digest::of_all);
+    digest.map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
 /// How plugins from files are kept apart.
-fn isolation(search: &PluginSearch, data: Option<&Path>) -> Isolation {
+fn isolation(search: &PluginSearch) -> Isolation {
     Isolation {
         program: search.program.clone(),
         call_limit: Duration::from_secs_f64(search.plugin_timeout),
         memory_mib: search.plugin_memory,
-        crashes: data.map(|data| CrashLog::new(&data.join(CRASHED))),
+        forgets: false,
     }
 }
 
@@ -83,9 +108,10 @@ pub fn load(registry: &Registry, name: &str) -> Result<Plugin, Failure> {
     })
 }
 
-/// Where this user's plugins are kept.
+/// Where this user's plugins are kept. A relative path counts for nothing, as the XDG base directory specification asks:
+/// it would be another directory wherever the program is started.
 pub fn data_directory() -> Option<PathBuf> {
-    let named = |key: &str| std::env::var_os(key).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let named = |key: &str| std::env::var_os(key).map(PathBuf::from).filter(|path| path.is_absolute());
     let base = named("XDG_DATA_HOME").or_else(|| Some(named("HOME")?.join(".local/share")))?;
     Some(base.join("resurvey"))
 }
@@ -130,19 +156,29 @@ impl Choices {
         Ok(choices)
     }
 
-    /// What a run was recorded with: every setting spelt out.
-    pub fn recorded(plugins: &[PluginUse]) -> Self {
+    /// What a run was recorded with: every setting spelt out, but that `files` say where files lie now.
+    pub fn recorded(plugins: &[PluginUse], files: &[String]) -> Result<Self, Failure> {
         let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         let settings = plugins.iter().flat_map(|used| {
             let settings = used.settings.as_object().into_iter().flatten();
             settings.map(|(key, value)| (used.name.clone(), key.clone(), text(value)))
         });
-        Self {
-            assignments: settings.map(|(plugin, key, value)| Assignment { plugin, key, value }).collect(),
-            profile: None,
-            gate: GateLimits::default(),
-            search: SearchLimits::default(),
+        let mut assignments: Vec<Assignment> =
+            settings.map(|(plugin, key, value)| Assignment { plugin, key, value }).collect();
+        for file in files {
+            let wrong = |error: &dyn std::fmt::Display| Failure::usage(format!("--file {file}: {error}"));
+            let moved: Assignment = file.parse().map_err(|error| wrong(&error))?;
+            let names_it = |used: &PluginUse| {
+                used.name == moved.plugin && used.files.iter().any(|model| model.setting == moved.key)
+            };
+            if !plugins.iter().any(names_it) {
+                return Err(wrong(&"expected a setting that named a file then"));
+            }
+            assignments.retain(|known| (&known.plugin, &known.key) != (&moved.plugin, &moved.key));
+            assignments.push(moved);
         }
+        let (gate, search) = (GateLimits::default(), SearchLimits::default());
+        Ok(Self { assignments, profile: None, gate, search })
     }
 
     /// How the evidence records how far the search goes.
@@ -237,9 +273,9 @@ impl Tool {
         let info: &PluginInfo = self.plugin.info();
         let mut files = Vec::new();
         for (setting, path) in self.settings.files(self.plugin.schema()) {
-            let bytes = std::fs::read(&path)
-                .map_err(|error| Failure::input(format!("{}.{setting}: {}: {error}", info.name, path.display())))?;
-            files.push(ModelFile { setting, sha256: Digest::of(&bytes) });
+            let wrong = |failure: Failure| Failure::input(format!("{}.{setting}: {failure}", info.name));
+            let sha256 = file_digest(&path).map_err(wrong)?;
+            files.push(ModelFile { setting, sha256 });
         }
         Ok(PluginUse {
             kind: info.kind.to_string(),

@@ -34,7 +34,7 @@ impl Plugin for BannerWatch {
 
 impl Detector for BannerWatch {
     fn detect(&mut self, host: &dyn Host, comparison: &Comparison<'_>) -> Result<Vec<ChangeRegion>, Error> {
-        let banner = host.classes().by_name("banner").ok_or_else(|| Error("the map has no class banner".to_owned()))?;
+        let banner = host.classes().by_name("banner").ok_or("expected a map with a class banner, found none")?;
         let (photo, view) = (comparison.photo, comparison.view.labels);
         let is_new = |u: u32, v: u32| photo.at(u, v) == banner.index.0 && view.at(u, v) != banner.index.0;
         let pixels: Vec<[u32; 2]> = (0..photo.height())

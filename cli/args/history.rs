@@ -1,6 +1,6 @@
 //! Arguments of the commands on history: difference, undo, names, change sets, review, forgetting.
 
-use super::Region;
+use super::{Region, number};
 use clap::{Args, ValueEnum};
 use resurvey_core::version::PluginBuild;
 use std::path::PathBuf;
@@ -15,15 +15,15 @@ pub struct Diff {
     pub range: String,
     #[command(flatten)]
     pub region: Region,
-    /// Form of the answer
-    #[arg(long, value_enum, default_value = "text")]
-    pub format: DiffFormat,
+    /// Form of the answer [default: text, or json with --json]
+    #[arg(long, value_enum)]
+    pub format: Option<DiffFormat>,
 }
 
 /// Form of a difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DiffFormat {
-    /// ++ came, -- went, - and + the old and the new value of what changed
+    /// ++ came, -- went, ~~ changed: - and + are the old and the new value
     Text,
     /// One JSON document
     Json,
@@ -40,7 +40,7 @@ pub struct Revert {
     #[arg(value_name = "REV", conflicts_with = "by_plugin")]
     pub revision: Option<String>,
     /// Undo every version that a plugin took part in and that still shows, all or none: the SHA-256 of its build (8 digits
-    /// or more), NAME or NAME@VERSION
+    /// or more), NAME or NAME@VERSION, e.g. semantic@0.1.0
     #[arg(long, value_name = "BUILD")]
     pub by_plugin: Option<PluginBuild>,
     /// Only what lies in the region before or after
@@ -75,7 +75,7 @@ pub struct Tag {
     #[arg(value_name = "REV", default_value = "head")]
     pub revision: String,
     /// Take the name away; the version stays
-    #[arg(long, requires = "name")]
+    #[arg(long, requires = "name", conflicts_with = "revision")]
     pub delete: bool,
 }
 
@@ -98,16 +98,17 @@ pub struct Proposals {
     #[arg(value_enum, default_value = "list")]
     pub action: ProposalAction,
     /// Number of the proposal, as list prints it
+    #[arg(value_parser = number)]
     pub id: Option<u64>,
-    /// Also list what was accepted or rejected
+    /// Also list what was accepted or rejected (with list)
     #[arg(long)]
     pub all: bool,
-    /// Who decides
-    #[arg(long, value_name = "NAME", default_value = "resurvey")]
-    pub by: String,
-    /// Why
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    pub note: String,
+    /// Who decides, with accept and reject, e.g. ada [default: resurvey]
+    #[arg(long, value_name = "NAME")]
+    pub by: Option<String>,
+    /// Why, with accept and reject, e.g. "seen on site"
+    #[arg(long, value_name = "TEXT")]
+    pub note: Option<String>,
 }
 
 /// What to do with proposals.
@@ -128,7 +129,7 @@ pub enum ProposalAction {
 pub struct Gc {
     /// Map file
     pub map: PathBuf,
-    /// Forget the versions before this version, tag or date, but for tagged ones and head
+    /// Forget the versions before this version, tag or date, e.g. @2026-01-01, but for tagged ones and head
     #[arg(long, value_name = "REV")]
     pub forget_before: Option<String>,
     /// Only say what would be removed

@@ -25,8 +25,8 @@ pub enum Plugins {
     Check(Check),
     /// Copy a plugin file to the user's data directory and allow it
     ///
-    /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; an older build of
-    /// the same name is taken away.
+    /// Checks it first. The file lies under its SHA-256 afterwards, and that stands in allowed-plugins; older builds of the
+    /// same name stay for replay and run no more.
     Install(Install),
     /// Write a project for a plugin of your own, which builds and passes "plugins check"
     ///
@@ -43,7 +43,7 @@ pub enum Plugins {
 /// Arguments of `plugins check`.
 #[derive(Debug, Args)]
 pub struct Check {
-    /// Library of the plugin
+    /// Plugin file: a library, or an executable that is called resurvey-plugin-NAME
     pub file: PathBuf,
     #[command(flatten)]
     pub limits: Limits,
@@ -69,7 +69,7 @@ pub struct Limits {
 /// Arguments of `plugins install`.
 #[derive(Debug, Args)]
 pub struct Install {
-    /// Library of the plugin
+    /// Plugin file: a library, or an executable that is called resurvey-plugin-NAME
     pub file: PathBuf,
     /// Do not run the tests of plugins check first
     #[arg(long)]
@@ -83,9 +83,12 @@ pub struct Install {
 pub struct New {
     /// Name of the plugin: a-z and 0-9, words joined by dashes, such as facade-edges
     pub name: String,
-    /// What it replaces: the search for the pose, the search for changes, or the measuring
+    /// What it replaces: the search for the pose, the search for changes, the measuring, or the labelling of a photo
     #[arg(long, value_enum)]
     pub kind: NewKind,
+    /// Of a matcher: whether the host searches or the plugin does
+    #[arg(long, value_enum, default_value_t = NewForm::Score)]
+    pub form: NewForm,
     /// Its language
     #[arg(long, value_enum)]
     pub lang: Language,
@@ -106,6 +109,17 @@ pub enum NewKind {
     Detector,
     /// Measures what came, and says what went
     Estimator,
+    /// Says which class each pixel of a photo is
+    Segmenter,
+}
+
+/// Forms of a matcher that can be begun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum NewForm {
+    /// Scores a view; the host makes candidates, renders and searches
+    Score,
+    /// Searches by itself, with what the host renders and compares for it
+    Search,
 }
 
 /// Languages of `plugins new`.
@@ -115,6 +129,8 @@ pub enum Language {
     Rust,
     /// One file, the header, a Makefile
     C,
+    /// The same as a class of C++17; a matcher that scores
+    Cpp,
     /// A class on NumPy arrays; runs in a process of its own
     Python,
 }
@@ -125,6 +141,16 @@ impl fmt::Display for NewKind {
             Self::Matcher => "matcher",
             Self::Detector => "detector",
             Self::Estimator => "estimator",
+            Self::Segmenter => "segmenter",
+        })
+    }
+}
+
+impl fmt::Display for NewForm {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Score => "score",
+            Self::Search => "search",
         })
     }
 }
@@ -134,6 +160,7 @@ impl fmt::Display for Language {
         formatter.write_str(match self {
             Self::Rust => "rust",
             Self::C => "c",
+            Self::Cpp => "cpp",
             Self::Python => "python",
         })
     }

@@ -1,10 +1,11 @@
 //! `resurvey diff`.
 
-use super::crs_of;
+use super::{crs_of, one_format};
 use crate::args::{Diff, DiffFormat};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use crate::region;
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{History, MapFile};
@@ -17,11 +18,11 @@ pub fn run(options: &Diff, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open_read_only(&options.map)?;
     let (from, to) = map.resolve_range(&options.range)?;
     let crs = crs_of(&map)?;
-    let bounds = region::bbox(&options.region, crs, false)?;
+    let bounds = region::bbox(&options.region, crs)?;
     let deltas = map.changes(from, to, bounds.as_ref())?;
     let (before, after) = (map.snapshot(from)?, map.snapshot(to)?);
     let sides = Sides { before: before.classes(), after: after.classes() };
-    match if console.is_json() { DiffFormat::Json } else { options.format } {
+    match one_format(options.format, [DiffFormat::Json, DiffFormat::Geojson], DiffFormat::Text, console)? {
         DiffFormat::Json => {
             let changes = deltas.iter().map(|delta| sides.document(delta)).collect::<Result<Vec<_>, _>>()?;
             console.document(&json!({ "from": from.0, "to": to.0, "changes": changes }))?;
@@ -31,6 +32,7 @@ pub fn run(options: &Diff, console: &mut Console<'_>) -> Result<u8, Failure> {
             for delta in &deltas {
                 features.extend(sides.geojson(delta, crs)?);
             }
+            region::tell_unplaced(features.iter().filter(|one| one["geometry"].is_null()).count(), crs, console);
             console.document(&json!({ "type": "FeatureCollection", "features": features }))?;
         }
         DiffFormat::Text => {
@@ -60,7 +62,8 @@ impl Sides<'_> {
         Ok(json!({ "op": op(delta), "fid": delta.fid().0, "class": class, "before": before, "after": after }))
     }
 
-    /// `++` and `--` for what came and went, `-` and `+` for every value that changed.
+    /// `++` and `--` for what came and went; for what changed `~~` with what it is now, and `-` and `+` for every value that
+    /// is another.
     pub(super) fn text(&self, delta: &Delta, console: &mut Console<'_>) -> Result<(), Failure> {
         // Number 0 stands for one that the map has not given yet.
         let fid = if delta.fid() == Fid(0) { "new".to_owned() } else { delta.fid().to_string() };
@@ -68,6 +71,7 @@ impl Sides<'_> {
             (None, Some(after)) => console.line(format_args!("++ {fid} {}", words(after, self.after)))?,
             (Some(before), None) => console.line(format_args!("-- {fid} {}", words(before, self.before)))?,
             (Some(before), Some(after)) => {
+                console.line(format_args!("~~ {fid} {}", words(after, self.after)))?;
                 let (old, new) = (document::state(before, self.before)?, document::state(after, self.after)?);
                 for key in new.keys().chain(old.keys().filter(|key| !new.contains_key(*key))) {
                     let (old, new) = (old.get(key), new.get(key));
@@ -76,7 +80,7 @@ impl Sides<'_> {
                     }
                     for (sign, value) in [('-', old), ('+', new)] {
                         if let Some(value) = value {
-                            console.line(format_args!("{sign} {fid} {key} = {value}"))?;
+                            console.line(format_args!("{sign} {fid} {key} = {}", plain(&value.to_string())))?;
                         }
                     }
                 }
@@ -95,7 +99,6 @@ impl Sides<'_> {
             properties.insert("fid".to_owned(), json!(delta.fid().0));
             properties.insert("op".to_owned(), json!(op(delta)));
             properties.insert("side".to_owned(), json!(side));
-            properties.insert("kind".to_owned(), json!(state.kind_name()));
             properties.extend(document::state(state, classes)?);
             let geometry = region::geojson(crs, state)?;
             let id = format!("{}:{side}", delta.fid());
@@ -115,11 +118,11 @@ pub(super) fn op(delta: &Delta) -> &'static str {
 }
 
 /// What and where something is, in one line.
-pub(super) fn words(state: &FeatureState, classes: &ClassTable) -> String {
+pub(crate) fn words(state: &FeatureState, classes: &ClassTable) -> String {
     match state {
         FeatureState::Descriptor(descriptor) => {
             let at = descriptor.anchor();
-            let class = classes.name(descriptor.class());
+            let class = plain(classes.name(descriptor.class()));
             let size = match descriptor {
                 Descriptor::Material(_) => {
                     let file = resurvey_core::version::descriptor_to_file(descriptor, classes);

@@ -5,6 +5,7 @@ use crate::commands::localize::pose_text;
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use resurvey_core::store::{History, MapFile, Provenance, RecordedObservation};
 use resurvey_core::version::{Fid, LocalizationEvidence, Observation, PluginUse, Side, VersionId};
 use resurvey_schema::{ClassTable, Intrinsics};
@@ -119,10 +120,10 @@ fn single(recorded: &RecordedObservation, classes: &ClassTable) -> Value {
 
 fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut Console<'_>) -> Result<(), Failure> {
     let record = &step.record;
-    let (version, kind, author) = (record.version, record.kind.name(), &record.author);
+    let (version, kind, author) = (record.version, record.kind.name(), plain(&record.author));
     let op = step.step.name().unwrap_or("unknown, forgotten,");
     console.line(format_args!("version {version}: {op} by {kind}, {author}, {}", record.committed_at))?;
-    console.line(format_args!("  message   {}", record.message))?;
+    console.line(format_args!("  message   {}", plain(&record.message)))?;
     console.line(format_args!("  hash      {}", record.hash))?;
     for (name, side) in [("before", &step.step.before), ("after", &step.step.after)] {
         match side {
@@ -132,7 +133,8 @@ fn print(map: &MapFile, step: &Provenance, classes: &ClassTable, console: &mut C
         }
     }
     if let Some(reverted) = record.reverts {
-        console.line(format_args!("  undoes    version {reverted}: {}", map.version(reverted)?.message))?;
+        let message = map.version(reverted)?.message;
+        console.line(format_args!("  undoes    version {reverted}: {}", plain(&message)))?;
         if let Some(seen) = map.observation_of(reverted)? {
             print_observation(map, &seen, classes, console)?;
         }
@@ -192,7 +194,11 @@ fn print_single(
         let (before, after) = (classes.name(rejection.class_before), classes.name(rejection.class_after));
         console.line(format_args!(
             "  rejected  {before} -> {after}, {} px: {} is {:.3} {}, limit {:.3}",
-            rejection.pixels, rejection.requirement, rejection.measured, rejection.unit, rejection.limit
+            rejection.pixels,
+            plain(&rejection.requirement),
+            rejection.measured,
+            plain(&rejection.unit),
+            rejection.limit
         ))?;
     }
     Ok(())
@@ -245,11 +251,13 @@ fn print_pose(found: &LocalizationEvidence, console: &mut Console<'_>) -> Result
 
 fn print_plugin(used: &PluginUse, console: &mut Console<'_>) -> Result<(), Failure> {
     let sha256 = used.sha256.map_or_else(|| "built in".to_owned(), |digest| digest.to_string());
-    console.line(format_args!("  {:9} {} {} {sha256}", used.kind, used.name, used.version))?;
+    let (name, version) = (plain(&used.name), plain(&used.version));
+    console.line(format_args!("  {:9} {name} {version} {sha256}", used.kind))?;
     let digest = used.settings_sha256.map_or_else(String::new, |digest| format!(", sha256 {digest}"));
-    console.line(format_args!("            settings {}{digest}", used.settings))?;
+    let settings = used.settings.to_string();
+    console.line(format_args!("            settings {}{digest}", plain(&settings)))?;
     for file in &used.files {
-        console.line(format_args!("            {} sha256 {}", file.setting, file.sha256))?;
+        console.line(format_args!("            {} sha256 {}", plain(&file.setting), file.sha256))?;
     }
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! `resurvey export`.
 
-use super::{crs_of, write_file};
+use super::crs_of;
 use crate::args::Export;
 use crate::console::Console;
 use crate::failure::{Failure, MAP};
+use crate::out_file::{check_file, write_file, write_files};
 use crate::region;
 use resurvey_core::export::{ExportScene, Mark, glb, gltf};
 use resurvey_core::mesh::{Object, decode_mesh};
@@ -12,13 +13,15 @@ use resurvey_core::version::{BoxMm, Delta, FeatureState, VersionId};
 use resurvey_schema::Descriptor;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::Path;
 
 /// Writes a version, what differs between two, or a region of either.
 pub fn run(options: &Export, console: &mut Console<'_>) -> Result<u8, Failure> {
     let form = form(&options.out)?;
+    check_file(&options.out)?;
     let map = MapFile::open_read_only(&options.map)?;
-    let bounds = region::bbox(&options.region, crs_of(&map)?, false)?;
+    let bounds = region::bbox(&options.region, crs_of(&map)?)?;
     let mut things = Things::default();
     let range = options.diff.as_deref().map(|range| map.resolve_range(range)).transpose()?;
     let version = match range {
@@ -122,13 +125,18 @@ fn write(scene: &ExportScene<'_>, form: Form, out: &Path) -> Result<usize, Failu
         }
         Form::Gltf => {
             let buffer = out.with_extension("bin");
-            let name = buffer.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let files = gltf(scene, &name)?;
-            write_file(&buffer, &files.buffer)?;
-            write_file(out, &files.json)?;
+            let files = gltf(scene, &reference(buffer.file_name().unwrap_or_default()))?;
+            write_files(&[(&buffer, &files.buffer), (out, &files.json)])?;
             Ok(files.json.len() + files.buffer.len())
         }
     }
+}
+
+/// A relative URI of a file beside the one that names it (RFC 3986).
+fn reference(name: &OsStr) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+    let escape = |byte: &u8| if is_plain(*byte) { char::from(*byte).to_string() } else { format!("%{byte:02X}") };
+    name.as_encoded_bytes().iter().map(escape).collect()
 }
 
 #[derive(Clone, Copy)]

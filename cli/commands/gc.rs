@@ -16,6 +16,7 @@ pub fn run(options: &Gc, console: &mut Console<'_>) -> Result<u8, Failure> {
     let size_before = size(&options.map);
     let forgetting = if options.dry_run { map.gc_plan(before)? } else { map.gc(before, Timestamp::now())? };
     if !options.dry_run && !forgetting.is_empty() {
+        console.did("what nobody uses was removed");
         // What was removed stays removed; only its space is not given back.
         if let Err(error) = map.compact() {
             console.message(&format!("warning: removed, but the file could not be made smaller: {error}"));

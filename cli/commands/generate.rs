@@ -3,6 +3,7 @@
 use crate::args::{Cli, Completions, Man};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::out_file::make_directory;
 use clap::CommandFactory;
 use serde_json::json;
 
@@ -18,7 +19,7 @@ pub fn completions(options: &Completions, console: &mut Console<'_>) -> Result<u
 /// Writes a manual page per command.
 pub fn man(options: &Man, console: &mut Console<'_>) -> Result<u8, Failure> {
     let failed = |error: std::io::Error| Failure::input(format!("{}: {error}", options.out.display()));
-    std::fs::create_dir_all(&options.out).map_err(failed)?;
+    make_directory(&options.out)?;
     clap_mangen::generate_to(Cli::command(), &options.out).map_err(failed)?;
     if console.is_json() {
         let entries = std::fs::read_dir(&options.out).and_then(Iterator::collect::<Result<Vec<_>, _>>);

@@ -5,6 +5,7 @@ use crate::args::{Import, UpAxis};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::plain::plain;
 use crate::request::Request;
 use jiff::Timestamp;
 use resurvey_core::crs::{Crs, LocalOrigin};
@@ -55,6 +56,7 @@ pub fn run(options: &Import, console: &mut Console<'_>) -> Result<u8, Failure> {
     }
     let made = map.commit_once(&transaction, Timestamp::now())?;
     console.finish(&stage);
+    console.did(format_args!("version {} was committed", made.version));
     print(made, &reports, console)
 }
 
@@ -63,7 +65,7 @@ fn print(made: Made, reports: &[(String, ImportReport)], console: &mut Console<'
     let version = made.version;
     for (file, report) in reports {
         for warning in &report.warnings {
-            console.message(&format!("{file}: {warning}"));
+            console.message(&plain(&format!("warning: {file}: {warning}")));
         }
     }
     if console.is_json() {

@@ -35,6 +35,7 @@ pub fn run(options: &Init, console: &mut Console<'_>) -> Result<u8, Failure> {
             (error @ StoreError::Io { .. }, _) => Failure::new(INPUT, error),
             (error, _) => error.into(),
         })?;
+    console.did(format_args!("{} was made", options.map.display()));
     if console.is_json() {
         let frame = map.info()?.frame;
         console.document(&json!({
@@ -50,6 +51,8 @@ pub fn run(options: &Init, console: &mut Console<'_>) -> Result<u8, Failure> {
 fn read_classes(path: &Path) -> Result<ClassTable, Failure> {
     let wrong = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| wrong(&error))?;
-    let classes: Vec<Class> = serde_json::from_str(&text).map_err(|error| wrong(&error))?;
+    let classes: Vec<Class> = serde_json::from_str(&text).map_err(|error| {
+        wrong(&format!("expected a JSON array of classes, as \"resurvey init --help\" has one: {error}"))
+    })?;
     ClassTable::new(classes).map_err(|error| wrong(&error))
 }

@@ -23,10 +23,12 @@ mod review;
 pub mod tag;
 pub mod update;
 
-use crate::failure::Failure;
+use crate::console::Console;
+use crate::failure::{Failure, MISSING};
 use resurvey_core::crs::Crs;
 use resurvey_core::store::{MapFile, StoreError};
-use std::path::Path;
+use resurvey_core::version::{PluginBuild, VersionId};
+use std::collections::BTreeSet;
 
 /// The map's coordinate reference system.
 fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
@@ -36,13 +38,41 @@ fn crs_of(map: &MapFile) -> Result<Crs, Failure> {
     })
 }
 
-/// Writes a file that the user named, over one that is there unless that is a map.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    if MapFile::open_read_only(path).is_ok() {
-        let text = format!("{}: expected a file to write, found a map, which nothing writes over", path.display());
-        return Err(Failure::input(text));
+/// The versions, newest first, that a build took part in. One that was never seen at all is missing.
+fn versions_by(map: &MapFile, build: &PluginBuild) -> Result<Vec<VersionId>, Failure> {
+    let versions = map.versions_by(build)?;
+    if !versions.is_empty() {
+        return Ok(versions);
     }
-    std::fs::write(path, bytes).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+    let mut known = BTreeSet::new();
+    for used in map.observations()?.into_iter().flat_map(|recorded| recorded.observation.plugins) {
+        if build.is(&used) {
+            return Ok(versions);
+        }
+        let digits: String = used.sha256.map(|sha256| sha256.to_string()).unwrap_or_default().chars().take(8).collect();
+        known.insert(format!("{}@{} ({digits})", used.name, used.version));
+    }
+    let known = known.into_iter().collect::<Vec<_>>().join(", ");
+    let recorded = if known.is_empty() { "no plugin at all".to_owned() } else { known };
+    let text = format!("no plugin {build} in the evidence of this map; recorded are {recorded}");
+    Err(Failure::new(MISSING, anyhow::anyhow!(text)))
+}
+
+/// The form of an answer, where --format and --json ask for the same: `json` is what --json means alone, `geojson` is a JSON
+/// document too.
+fn one_format<F: Copy + PartialEq>(
+    asked: Option<F>,
+    [json, geojson]: [F; 2],
+    default: F,
+    console: &Console<'_>,
+) -> Result<F, Failure> {
+    match (asked, console.is_json()) {
+        (Some(asked), true) if asked != json && asked != geojson => {
+            Err(Failure::usage("--json is one JSON document: expected --format json or geojson beside it, or none"))
+        }
+        (asked, true) => Ok(asked.unwrap_or(json)),
+        (asked, false) => Ok(asked.unwrap_or(default)),
+    }
 }
 
 /// A CSV cell, quoted where it must be (RFC 4180).

@@ -3,11 +3,15 @@
 use super::diff::Sides;
 use crate::args::{ProposalAction, Proposals};
 use crate::commands::evidence;
+use crate::conflict::refused;
 use crate::console::Console;
-use crate::failure::{CONFLICT, Failure};
+use crate::failure::{CONFLICT, Failure, conflict};
+use crate::plain::plain;
 use comfy_table::{Table, presets};
 use jiff::Timestamp;
-use resurvey_core::store::{History, MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot};
+use resurvey_core::store::{
+    ConflictingChange, History, MapFile, Proposal, ProposalStatus, RecordedObservation, Snapshot,
+};
 use resurvey_core::update::in_the_way;
 use resurvey_core::version::{BoxMm, Delta, FeatureState, Fid};
 use resurvey_schema::{ClassTable, Descriptor};
@@ -15,6 +19,7 @@ use serde_json::{Value, json};
 
 /// Lists, shows and decides proposals.
 pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
+    refuse_what_is_not_used(options)?;
     let id = || {
         let expected = "expected the number of a proposal, as \"resurvey proposals MAP list\" prints it";
         options.id.ok_or_else(|| Failure::usage(expected))
@@ -25,7 +30,13 @@ pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure
         ProposalAction::Accept => accept(options, id()?, console),
         ProposalAction::Reject => {
             let id = id()?;
-            MapFile::open(&options.map)?.reject(id, &options.by, &options.note, Timestamp::now())?;
+            MapFile::open(&options.map)?.reject(
+                id,
+                decider(options),
+                options.note.as_deref().unwrap_or_default(),
+                Timestamp::now(),
+            )?;
+            console.did(format_args!("proposal {id} was rejected"));
             if console.is_json() {
                 console.document(&json!({ "id": id, "status": "rejected" }))?;
             } else {
@@ -34,6 +45,23 @@ pub fn run(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure
             Ok(0)
         }
     }
+}
+
+/// Refuses what the action would pass over in silence.
+fn refuse_what_is_not_used(options: &Proposals) -> Result<(), Failure> {
+    let is_list = options.action == ProposalAction::List;
+    let decides = matches!(options.action, ProposalAction::Accept | ProposalAction::Reject);
+    let unused = [
+        (is_list && options.id.is_some(), "a number belongs to show, accept and reject"),
+        (!is_list && options.all, "--all belongs to list"),
+        (!decides && options.by.is_some(), "--by belongs to accept and reject"),
+        (!decides && options.note.is_some(), "--note belongs to accept and reject"),
+    ];
+    unused.into_iter().find(|(is_unused, _)| *is_unused).map_or(Ok(()), |(_, text)| Err(Failure::usage(text)))
+}
+
+fn decider(options: &Proposals) -> &str {
+    options.by.as_deref().unwrap_or("resurvey")
 }
 
 fn list(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
@@ -54,7 +82,7 @@ fn list(options: &Proposals, console: &mut Console<'_>) -> Result<u8, Failure> {
             proposal.id.to_string(),
             status(proposal).to_owned(),
             proposal.proposed_at.to_string(),
-            proposal.transaction.author.clone(),
+            plain(&proposal.transaction.author).into_owned(),
             changes.join("; "),
         ]);
     }
@@ -74,11 +102,13 @@ fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure
         console.document(&document)?;
         return Ok(0);
     }
-    console.line(format_args!("proposal {id}: {}, by {}", status(&proposal), proposal.transaction.author))?;
-    console.line(format_args!("  message   {}", proposal.transaction.message))?;
+    let (author, message) = (plain(&proposal.transaction.author), plain(&proposal.transaction.message));
+    console.line(format_args!("proposal {id}: {}, by {author}", status(&proposal)))?;
+    console.line(format_args!("  message   {message}"))?;
     console.line(format_args!("  base      version {}", proposal.transaction.base))?;
     if let Some(decision) = &proposal.decision {
-        console.line(format_args!("  decided   {} by {}: {}", decision.at, decision.by, decision.note))?;
+        let (by, note) = (plain(&decision.by), plain(&decision.note));
+        console.line(format_args!("  decided   {} by {by}: {note}", decision.at))?;
     }
     let sides = Sides { before: classes, after: classes };
     for delta in deltas(&proposal) {
@@ -93,11 +123,16 @@ fn show(map: &MapFile, id: u64, console: &mut Console<'_>) -> Result<u8, Failure
 
 fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
-    let proposal = map.proposal(id)?;
-    if proposal.status == ProposalStatus::Open {
-        refuse_what_is_there(&map, &proposal)?;
-    }
-    let version = map.accept(id, &options.by, &options.note, Timestamp::now())?;
+    let accepted = map.together(|map| -> Result<_, Failure> {
+        let proposal = map.proposal(id)?;
+        if proposal.status == ProposalStatus::Open {
+            refuse_what_is_there(map, &proposal)?;
+        }
+        let accepted = map.accept(id, decider(options), options.note.as_deref().unwrap_or_default(), Timestamp::now());
+        accepted.map_err(|error| of_proposal(refused(error, map, &proposal.transaction.deltas), &proposal))
+    });
+    let version = accepted?;
+    console.did(format_args!("proposal {id} was accepted as version {version}"));
     if console.is_json() {
         console.document(&json!({ "id": id, "status": "accepted", "version": version.0 }))?;
     } else {
@@ -106,15 +141,30 @@ fn accept(options: &Proposals, id: u64, console: &mut Console<'_>) -> Result<u8,
     Ok(0)
 }
 
+/// A conflict of the proposal, for machines too.
+fn of_proposal(failure: Failure, proposal: &Proposal) -> Failure {
+    failure.with("id", proposal.id).with("status", status(proposal))
+}
+
 /// Refuses to put on the map what another update put there since.
 fn refuse_what_is_there(map: &MapFile, proposal: &Proposal) -> Result<(), Failure> {
-    let snapshot = map.snapshot(map.head()?)?;
+    let head = map.head()?;
+    let snapshot = map.snapshot(head)?;
     for state in &proposal.transaction.additions {
         let FeatureState::Descriptor(added) = state else { continue };
         if let Some(fid) = in_the_way(added, &descriptors_near(&snapshot, &state.bounds()?)?) {
             let next = format!("look at both with \"resurvey why\" and \"proposals show {}\"", proposal.id);
             let text = format!("feature {fid} is where proposal {} puts its own; {next}", proposal.id);
-            return Err(Failure::new(CONFLICT, anyhow::anyhow!(text)));
+            let there = map.feature(head, Fid(fid))?;
+            let change = ConflictingChange {
+                fid: there.fid,
+                changed_in: Some(there.from),
+                found: Some(there.state),
+                is_target: false,
+            };
+            let document = conflict(proposal.transaction.base, head, &[change], &[]);
+            let failure = Failure::new(CONFLICT, anyhow::anyhow!(text)).with_document(document);
+            return Err(of_proposal(failure, proposal));
         }
     }
     Ok(())

@@ -1,10 +1,11 @@
 //! `resurvey query`.
 
-use super::{crs_of, quoted};
+use super::{crs_of, one_format, quoted};
 use crate::args::{Query, QueryFormat};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, MISSING};
+use crate::plain::plain;
 use crate::region::{self, Shape};
 use comfy_table::{Table, presets};
 use resurvey_core::crs::Crs;
@@ -15,13 +16,15 @@ use serde_json::{Map, Value, json};
 
 /// Descriptors and objects in a region at a version.
 pub fn run(options: &Query, console: &mut Console<'_>) -> Result<u8, Failure> {
+    let format = one_format(options.format, [QueryFormat::Json, QueryFormat::Geojson], QueryFormat::Table, console)?;
     let map = MapFile::open_read_only(&options.map)?;
     let snapshot = map.snapshot(map.resolve(&options.at)?)?;
     let crs = crs_of(&map)?;
     check_classes(&options.class, snapshot.classes())?;
     let features = features(options, &snapshot, crs)?;
-    let answer = Answer { features: &features, classes: snapshot.classes(), crs, is_wgs84: options.wgs84 };
-    match if console.is_json() { QueryFormat::Json } else { options.format } {
+    let answer = Answer { features: &features, classes: snapshot.classes(), crs, is_wgs84: options.region.wgs84 };
+    answer.tell_unplaced(format, console)?;
+    match format {
         QueryFormat::Table => answer.table(console)?,
         QueryFormat::Json => {
             let features = features.iter().map(|feature| answer.fields(feature)).collect::<Result<Vec<_>, _>>()?;
@@ -49,7 +52,7 @@ fn check_classes(names: &[String], classes: &ClassTable) -> Result<(), Failure> 
 
 fn features(options: &Query, snapshot: &Snapshot<'_>, crs: Crs) -> Result<Vec<Feature>, Failure> {
     let shape = match (&options.polygon, options.near, options.radius) {
-        (Some(path), _, _) => Some(Shape::read_polygon(path, crs, options.wgs84)?),
+        (Some(path), _, _) => Some(Shape::read_polygon(path, crs, options.region.wgs84)?),
         (None, Some([latitude, longitude]), Some(radius_m)) => {
             if !(radius_m.is_finite() && radius_m >= 0.0) {
                 return Err(Failure::usage(format!("--radius {radius_m}: expected metres, 0 or more")));
@@ -60,7 +63,7 @@ fn features(options: &Query, snapshot: &Snapshot<'_>, crs: Crs) -> Result<Vec<Fe
     };
     let bounds = match &shape {
         Some(shape) => Some(region::around(&shape.outline(), region::checked_heights(&options.region)?)?),
-        None => region::bbox(&options.region, crs, options.wgs84)?,
+        None => region::bbox(&options.region, crs)?,
     };
     let found = match options.observed_at {
         Some(time) => snapshot.features_observed(time, bounds.as_ref())?,
@@ -110,23 +113,38 @@ impl Answer<'_> {
         }
     }
 
-    /// `x, y, height` of a point: grid metres, or longitude, latitude and ellipsoidal height.
-    fn coordinates(&self, point: GridPoint) -> Result<[f64; 3], Failure> {
+    /// `x, y, height` of a point: grid metres, or longitude, latitude and ellipsoidal height, which a point outside the
+    /// system does not have.
+    fn coordinates(&self, point: GridPoint) -> Result<Option<[f64; 3]>, Failure> {
         if !self.is_wgs84 {
-            return Ok(point.into());
+            return Ok(Some(point.into()));
         }
         let position = region::wgs84(self.crs, point)?;
-        Ok([position.longitude_deg, position.latitude_deg, position.ellipsoidal_height_m])
+        Ok(position.map(|found| [found.longitude_deg, found.latitude_deg, found.ellipsoidal_height_m]))
     }
 
     fn fields(&self, feature: &Feature) -> Result<Map<String, Value>, Failure> {
         let mut fields = document::feature(feature, self.classes)?;
         if self.is_wgs84 {
             let position = region::wgs84(self.crs, middle(&feature.state))?;
-            fields.insert("latitude".to_owned(), json!(position.latitude_deg));
-            fields.insert("longitude".to_owned(), json!(position.longitude_deg));
+            fields.insert("latitude".to_owned(), json!(position.map(|found| found.latitude_deg)));
+            fields.insert("longitude".to_owned(), json!(position.map(|found| found.longitude_deg)));
+            fields.insert("ellipsoidal_height".to_owned(), json!(position.map(|found| found.ellipsoidal_height_m)));
+            fields.insert("wgs84".to_owned(), json!(region::geojson(self.crs, &feature.state)?));
         }
         Ok(fields)
+    }
+
+    /// Says how many features have no place where degrees are asked for.
+    fn tell_unplaced(&self, format: QueryFormat, console: &mut Console<'_>) -> Result<(), Failure> {
+        if format == QueryFormat::Geojson || self.is_wgs84 {
+            let mut count = 0;
+            for feature in self.features {
+                count += usize::from(region::geojson(self.crs, &feature.state)?.is_none());
+            }
+            region::tell_unplaced(count, self.crs, console);
+        }
+        Ok(())
     }
 
     fn table(&self, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -144,15 +162,17 @@ impl Answer<'_> {
             "to",
         ]);
         for feature in self.features {
-            let [east, north, height] = self.coordinates(middle(&feature.state))?;
             let digits = if self.is_wgs84 { 8 } else { 2 };
+            let place = self.coordinates(middle(&feature.state))?;
+            let cell =
+                |axis: usize, digits: usize| place.map_or("-".to_owned(), |place| format!("{:.digits$}", place[axis]));
             table.add_row([
                 feature.fid.to_string(),
                 feature.state.kind_name().to_owned(),
-                self.class(feature).to_owned(),
-                format!("{east:.digits$}"),
-                format!("{north:.digits$}"),
-                format!("{height:.2}"),
+                plain(self.class(feature)).into_owned(),
+                cell(0, digits),
+                cell(1, digits),
+                cell(2, 2),
                 size(&feature.state, self.classes),
                 feature.from.to_string(),
                 feature.to.map_or_else(|| "-".to_owned(), |version| version.to_string()),
@@ -171,7 +191,9 @@ impl Answer<'_> {
         };
         console.line(format_args!("fid,kind,class,name,{x},{y},{h},width_m,height_m,area_m2,sigma_m,from,to"))?;
         for feature in self.features {
-            let [east, north, height] = self.coordinates(middle(&feature.state))?;
+            let place = self.coordinates(middle(&feature.state))?;
+            let [east, north, height] =
+                [0, 1, 2].map(|axis| place.map_or_else(String::new, |place| place[axis].to_string()));
             let fields = document::feature(feature, self.classes)?;
             let cell =
                 |key: &str| fields.get(key).filter(|value| !value.is_null()).map_or_else(String::new, Value::to_string);

@@ -1,9 +1,10 @@
 //! `resurvey render`.
 
-use super::{crs_of, write_file};
+use super::crs_of;
 use crate::args::Render;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::out_file::{make_directory, write_files};
 use crate::prior::{Placed, read_placed};
 use resurvey_core::camera::Camera;
 use resurvey_core::capture::read_pose;
@@ -42,11 +43,7 @@ pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
     let points = lidar::scan(&view, LIDAR_SPACING_M);
     let depth: Vec<u16> = view.range_m.values().iter().map(|range_m| grey(f64::from(*range_m))).collect();
     let depth = Raster::from_values(view.range_m.width(), view.range_m.height(), depth).expect("one level per pixel");
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| Failure::input(format!("{}: {error}", options.out.display())))?;
-    write_file(&options.out.join("class.png"), &write_label_png(&view.labels, snapshot.classes())?)?;
-    write_file(&options.out.join("depth.png"), &write_grey16_png(&depth)?)?;
-    write_file(&options.out.join("points.ply"), &lidar::write_ply(&points, snapshot.classes()))?;
+    make_directory(&options.out)?;
     let document = json!({
         "version": snapshot.version().0,
         "pose": pose,
@@ -56,7 +53,13 @@ pub fn run(options: &Render, console: &mut Console<'_>) -> Result<u8, Failure> {
         "depth": { "file": "depth.png", "unit_m": DEPTH_STEP_M, "nothing": 0, "along": "ray" },
         "points": { "file": "points.ply", "count": points.len(), "spacing_m": LIDAR_SPACING_M },
     });
-    write_file(&options.out.join("view.json"), &serde_json::to_vec_pretty(&document)?)?;
+    let place = |name: &str| options.out.join(name);
+    write_files(&[
+        (&place("class.png"), &write_label_png(&view.labels, snapshot.classes())?),
+        (&place("depth.png"), &write_grey16_png(&depth)?),
+        (&place("points.ply"), &lidar::write_ply(&points, snapshot.classes())),
+        (&place("view.json"), &serde_json::to_vec_pretty(&document)?),
+    ])?;
     console.finish(&stage);
     if console.is_json() {
         console.document(&document)?;

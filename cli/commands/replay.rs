@@ -1,36 +1,41 @@
 //! `resurvey replay`.
 
+mod builds;
+
 use super::crs_of;
 use super::update::{Comparers, Recording, Run, Work, exactly};
 use crate::args::{PluginSearch, Replay};
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, MISSING, PLUGIN};
-use crate::matching::MatchingTool;
-use crate::tools::{self, Choices, Tool, registry};
+use crate::tools::registry;
 use anyhow::anyhow;
+use builds::Tools;
 use resurvey_core::camera::{Camera, world_from_camera};
 use resurvey_core::capture::Capture;
 use resurvey_core::image::{LabelReading, read_labels};
 use resurvey_core::localize::{GateLimits, Located, SceneServices, SearchLimits, localize};
-use resurvey_core::plugin::{Kind, Registry};
+use resurvey_core::plugin::Kind;
 use resurvey_core::store::{History, MapFile, RecordedObservation, Snapshot};
-use resurvey_core::update::{Change, add_changes, world_around};
+use resurvey_core::update::{Change, Resolution, add_changes, world_around};
 use resurvey_core::version::{
     Delta, FeatureState, LocalizationEvidence, PluginUse, UpdateTransaction, VersionId, VersionKind,
 };
-use resurvey_schema::{ClassTable, Localization, Pose};
+use resurvey_schema::{ClassTable, Localization, Pose, Rejection};
 use serde_json::{Map, Value, json};
 
 /// Poses nearer than this are the same, metres and degrees: what is left of a height that came from the ground.
 const SAME_POSE: (f64, f64) = (0.001, 0.001);
+/// Measured numbers nearer than this share of them are the same, for the same reason.
+const SAME_SHARE: f64 = 1e-6;
 
 /// Runs the plugins of a version again on what it saw, and compares.
 pub fn run(options: &Replay, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
+    console.listen();
     let map = MapFile::open_read_only(&options.map)?;
     let version = map.resolve(&options.revision)?;
     let recorded = evidence(&map, version)?;
-    let tools = Tools::load(&recorded, &registry(plugins)?, options.any_build)?;
+    let tools = Tools::load(&recorded, &mut registry(plugins)?, options)?;
     let snapshot = map.snapshot(recorded.base)?;
     let capture = capture(&map, &snapshot, &recorded, options)?;
     let replayed = replay(&map, capture, &recorded, tools, console)?;
@@ -52,62 +57,6 @@ fn evidence(map: &MapFile, version: VersionId) -> Result<RecordedObservation, Fa
             format!("version {version} is of kind {kind} and was not made from a capture; there is nothing to replay");
         Failure::new(MISSING, anyhow!(text))
     })
-}
-
-/// The recorded plugins, as they are to be had now.
-struct Tools {
-    /// `None` where the pose was given.
-    matcher: Option<MatchingTool>,
-    detector: Tool,
-    estimator: Tool,
-    builds: Vec<Value>,
-}
-
-impl Tools {
-    fn load(recorded: &RecordedObservation, registry: &Registry, any_build: bool) -> Result<Self, Failure> {
-        let plugins = &recorded.observation.plugins;
-        let choices = Choices::recorded(plugins);
-        let named = |kind: &str| plugins.iter().find(|used| used.kind == kind).map(|used| used.name.as_str());
-        let (Some(detector), Some(estimator)) = (named("detector"), named("estimator")) else {
-            let id = recorded.id;
-            return Err(Failure::new(MISSING, anyhow!("observation {id} names no detector and estimator to replay")));
-        };
-        let matcher = named("matcher").map(|name| MatchingTool::load(registry, &choices, name)).transpose()?;
-        let [detector, estimator] =
-            [detector, estimator].map(|name| tools::load(registry, name).and_then(|plugin| choices.tool(&plugin)));
-        let (detector, estimator) = (detector?, estimator?);
-        let mut found = matcher.as_ref().map(MatchingTool::used).transpose()?.unwrap_or_default();
-        found.extend([detector.used()?, estimator.used()?]);
-        // The labels that a segmenter made are what was seen; it is not asked again.
-        let asked = plugins.iter().filter(|used| used.kind != "segmenter");
-        let builds = asked.map(|used| build(used, &found, any_build)).collect::<Result<_, _>>()?;
-        Ok(Self { matcher, detector, estimator, builds })
-    }
-}
-
-/// Whether what was `used` is among what is `found` now.
-fn build(used: &PluginUse, found: &[PluginUse], any_build: bool) -> Result<Value, Failure> {
-    let (kind, name) = (&used.kind, &used.name);
-    let now = found.iter().find(|now| now.kind == *kind && now.name == *name);
-    let sha256 = |used: &PluginUse| used.sha256.map(|digest| digest.to_string());
-    let is_same =
-        now.is_some_and(|now| (used.sha256.is_none() || used.sha256 == now.sha256) && used.files == now.files);
-    if !is_same && !any_build {
-        let text = |used: &PluginUse| format!("{} (version {})", sha256(used).unwrap_or_default(), used.version);
-        let of_files = if now.is_some_and(|now| now.files != used.files) { ", or with other files" } else { "" };
-        return Err(Failure::new(
-            PLUGIN,
-            anyhow!(
-                "{kind} {name}: expected the recorded build {}, found {}{of_files}; install that build, or compare with this \
-             one: --any-build",
-                text(used),
-                now.map_or_else(|| "none".to_owned(), text)
-            ),
-        ));
-    }
-    Ok(json!({
-        "kind": kind, "name": name, "sha256": sha256(used), "found_sha256": now.and_then(sha256), "same": is_same,
-    }))
 }
 
 /// What was seen: out of the map, or from the file whose digest was recorded.
@@ -169,7 +118,7 @@ fn not_kept(recorded: &RecordedObservation, segmenter: Option<&PluginUse>) -> Fa
 struct Replayed {
     located: Located,
     changes: Vec<Change>,
-    rejections: usize,
+    rejections: Vec<Rejection>,
     builds: Vec<Value>,
     was_given: bool,
 }
@@ -220,8 +169,8 @@ fn replay(
     let mut run = Run { map, crs, recording, timings: Map::new(), is_last: true };
     let work = Work { base: recorded.base, capture, world, prior: Value::Null };
     let (resolution, _, _) = run.compare(&work.world, &work.capture, &located, &mut comparers, console)?;
-    let rejections = resolution.rejections.len();
-    Ok(Replayed { located, changes: resolution.changes, rejections, builds: tools.builds, was_given })
+    let Resolution { changes, rejections, .. } = resolution;
+    Ok(Replayed { located, changes, rejections, builds: tools.builds, was_given })
 }
 
 /// A pose that was given, with what was said of it.
@@ -247,10 +196,14 @@ fn compare(
         true => (Vec::new(), Vec::new()),
         false => differing(&map.changes_of(version)?, &replayed.changes),
     };
-    let rejections_then = seen.rejections.len();
-    let is_same = is_same_pose && missing.is_empty() && new.is_empty() && rejections_then == replayed.rejections;
-    let states =
-        |states: &[Side]| states.iter().map(|side| side.document(snapshot.classes())).collect::<Result<Vec<_>, _>>();
+    let classes = snapshot.classes();
+    let (no_more, not_then) = other_rejections(&seen.rejections, &replayed.rejections);
+    let is_same_rejected = no_more.is_empty() && not_then.is_empty();
+    let is_same = is_same_pose && missing.is_empty() && new.is_empty() && is_same_rejected;
+    let states = |states: &[Side]| states.iter().map(|side| side.document(classes)).collect::<Result<Vec<_>, _>>();
+    let rejections = |some: &[&Rejection]| -> Vec<Value> {
+        some.iter().map(|rejection| document::rejection(rejection, classes)).collect()
+    };
     Ok(json!({
         "version": version.0,
         "base_version": recorded.base.0,
@@ -265,7 +218,10 @@ fn compare(
         },
         "changes": {
             "compared": !is_fused, "missing": states(&missing)?, "new": states(&new)?,
-            "rejections": { "recorded": rejections_then, "found": replayed.rejections },
+            "rejections": {
+                "recorded": seen.rejections.len(), "found": replayed.rejections.len(), "same": is_same_rejected,
+                "missing": rejections(&no_more), "new": rejections(&not_then),
+            },
         },
     }))
 }
@@ -326,6 +282,28 @@ fn differing(did: &[Delta], found: &[Change]) -> (Vec<Side>, Vec<Side>) {
     (missing, new)
 }
 
+/// Rejections that are not found again, and the other way round.
+fn other_rejections<'a>(then: &'a [Rejection], now: &'a [Rejection]) -> (Vec<&'a Rejection>, Vec<&'a Rejection>) {
+    let (mut new, mut missing): (Vec<&Rejection>, Vec<&Rejection>) = (now.iter().collect(), Vec::new());
+    for rejection in then {
+        match new.iter().position(|other| is_same_rejection(rejection, other)) {
+            Some(index) => {
+                new.remove(index);
+            }
+            None => missing.push(rejection),
+        }
+    }
+    (missing, new)
+}
+
+/// The same words, and the same numbers as far as poses are the same.
+fn is_same_rejection(a: &Rejection, b: &Rejection) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() <= SAME_SHARE * a.abs().max(b.abs());
+    let words =
+        |one: &Rejection| (one.class_before, one.class_after, one.pixels, one.requirement.clone(), one.unit.clone());
+    words(a) == words(b) && near(a.measured, b.measured) && near(a.limit, b.limit)
+}
+
 fn print(document: &Value, console: &mut Console<'_>) -> Result<(), Failure> {
     let verdict = if document["same"] == json!(true) { "the same" } else { "not the same" };
     console
@@ -348,5 +326,8 @@ fn print(document: &Value, console: &mut Console<'_>) -> Result<(), Failure> {
         console.line("  changes   fused from several captures: not compared")?;
     }
     let rejections = &changes["rejections"];
-    console.line(format_args!("  rejected  {} now, {} then", rejections["found"], rejections["recorded"]))
+    let others = |key: &str| rejections[key].as_array().map_or(0, Vec::len);
+    let (now, then) = (&rejections["found"], &rejections["recorded"]);
+    let text = format!("{now} now, {then} then: {} missing, {} new", others("missing"), others("new"));
+    console.line(format_args!("  rejected  {text}"))
 }

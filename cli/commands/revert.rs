@@ -1,15 +1,17 @@
 //! `resurvey revert`.
 
-use super::crs_of;
+use super::{crs_of, versions_by};
 use crate::args::Revert;
+use crate::conflict::refused;
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, NOTHING};
 use crate::region;
 use crate::request::Request;
 use jiff::Timestamp;
-use resurvey_core::store::{self, History, Made, MapFile, StoreError};
-use resurvey_core::version::{Digest, PluginBuild, Revision, VersionId, VersionKind};
+use resurvey_core::store::{self, CommitError, History, Made, MapFile, StoreError};
+use resurvey_core::update::refuse_doubles;
+use resurvey_core::version::{Delta, Digest, PluginBuild, Revision, VersionId, VersionKind};
 use serde_json::{Value, json};
 
 /// Undoes one version by a new one, or all that a plugin build did by one for each.
@@ -17,7 +19,7 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
     let map = MapFile::open(&options.map)?;
     let mut wish = store::Revert {
         version: VersionId(0),
-        region: region::bbox(&options.region, crs_of(&map)?, false)?,
+        region: region::bbox(&options.region, crs_of(&map)?)?,
         author: options.author.clone(),
         message: options.message.clone(),
         idempotency_key: options.retry.idempotency_key.clone(),
@@ -31,9 +33,17 @@ pub fn run(options: &Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
                 Some(version) => Made { version, repeated: true },
                 None => {
                     wish.version = map.resolve(revision)?;
-                    map.revert_once(&wish, Timestamp::now())?
+                    let reverted = map.together(|map| -> Result<_, CommitError> {
+                        let made = map.revert_once(&wish, Timestamp::now())?;
+                        if !made.repeated {
+                            refuse_doubles(map, made.version)?;
+                        }
+                        Ok(made)
+                    });
+                    reverted.map_err(|error| refused(error, &map, &undoing(&map, wish.version)))?
                 }
             };
+            console.did(format_args!("version {} was committed", made.version));
             let mut document = undone(&map, made.version)?;
             document::say_repeated(&mut document, made.repeated);
             if console.is_json() {
@@ -59,9 +69,22 @@ fn request(options: &Revert) -> Result<Digest, Failure> {
     Ok(request.with("by-plugin", options.by_plugin.as_ref()).with_region(&options.region).digest())
 }
 
+/// What an undo of `version` changes, for telling why it was refused.
+fn undoing(map: &MapFile, version: VersionId) -> Vec<Delta> {
+    map.changes_of(version).unwrap_or_default().into_iter().map(Delta::undone).collect()
+}
+
 fn all_of(map: &MapFile, build: &PluginBuild, wish: &store::Revert, console: &mut Console<'_>) -> Result<u8, Failure> {
-    let mut versions = map.versions_by(build)?;
-    let done = map.revert_all(&versions, wish, Timestamp::now())?;
+    let mut versions = versions_by(map, build)?;
+    let done = map.together(|map| -> Result<_, CommitError> {
+        let done = map.revert_all(&versions, wish, Timestamp::now())?;
+        if !done.repeated {
+            done.undone.iter().try_for_each(|(_, version)| refuse_doubles(map, *version))?;
+        }
+        Ok(done)
+    });
+    let done = done.map_err(|error| refused(error, map, &[]))?;
+    done.undone.iter().for_each(|(_, version)| console.did(format_args!("version {version} was committed")));
     if let Some((_, first)) = done.undone.first() {
         // What the build did since the first time is not what this undid.
         versions.retain(|version| version < first);

@@ -3,10 +3,11 @@
 
 use super::diff::Sides;
 use super::update::{Committed, Outcome, Run, message_of};
+use crate::conflict::refused;
 use crate::failure::Failure;
 use jiff::Timestamp;
 use resurvey_core::capture::Capture;
-use resurvey_core::store::{History, MapFile, StoreError};
+use resurvey_core::store::{History, MapFile, ProposalStatus, StoreError};
 use resurvey_core::update::{Change, Confirmation, add_changes, confirm, testimonies};
 use resurvey_core::version::{Decision, Digest, Observation, UpdateTransaction, VersionId, VersionKind};
 use serde_json::{Value, json};
@@ -52,8 +53,9 @@ impl Run<'_> {
             .collect();
         let evidence = Observation { decision: Decision::Proposed, ..evidence.clone() };
         let proposals = self.map.propose_each(&proposed, &evidence, now)?;
-        let waiting =
-            Committed { decision: Decision::Proposed, version: None, fids: Vec::new(), proposals, repeated: false };
+        let decided = self.decided(&proposals)?;
+        let decision = if decided.len() == proposals.len() { Decision::Nothing } else { Decision::Proposed };
+        let waiting = Committed { proposals, decided, ..Committed::nothing(decision) };
         let Review::Confirm(captures) = review else { return Ok(waiting) };
 
         let confirmed = self.confirmed(&waiting.proposals, captures)?;
@@ -72,13 +74,26 @@ impl Run<'_> {
         }
         transaction.evidence = Some(Observation { decision: Decision::Committed, confirmations, ..evidence });
         let closed: Vec<u64> = closed.into_iter().collect();
-        let version = self.map.confirm(&closed, &transaction, &note, now)?;
-        let added = self.map.changes_of(version)?;
-        let added: Vec<u64> =
-            added.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
+        let confirmed = self.map.confirm(&closed, &transaction, &note, now);
+        let version = confirmed.map_err(|error| refused(error, self.map, &transaction.deltas))?;
+        let did = self.map.changes_of(version)?;
+        let added: Vec<u64> = did.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
         // Where only some were confirmed, numbers cannot be told apart.
         let fids = if changes.len() == outcome.resolution.changes.len() { added } else { Vec::new() };
-        Ok(Committed { decision: Decision::Committed, version: Some(version), fids, ..waiting })
+        Ok(Committed { decision: Decision::Committed, version: Some(version), fids, did: Some(did), ..waiting })
+    }
+
+    /// Those of the proposals that somebody decided before: the same capture again says the same, once.
+    fn decided(&self, proposals: &[u64]) -> Result<Vec<(u64, &'static str)>, Failure> {
+        let mut decided = Vec::new();
+        for id in proposals {
+            match self.map.proposal(*id)?.status {
+                ProposalStatus::Open => {}
+                ProposalStatus::Accepted(_) => decided.push((*id, "accepted")),
+                ProposalStatus::Rejected => decided.push((*id, "rejected")),
+            }
+        }
+        Ok(decided)
     }
 
     /// The changes among the proposals `own` on which enough captures agree.

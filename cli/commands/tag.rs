@@ -18,6 +18,7 @@ pub fn run(options: &Tag, console: &mut Console<'_>) -> Result<u8, Failure> {
         map.tag(name, version, Timestamp::now())?;
         (version, "names")
     };
+    console.did(format_args!("{name} {verb} version {version}"));
     if console.is_json() {
         console.document(&json!({ "tag": name, "version": version.0, "deleted": options.delete }))?;
     } else {

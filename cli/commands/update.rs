@@ -1,13 +1,16 @@
 //! `resurvey update`: localize, detect, estimate, commit.
 
+mod tally;
+mod told;
+
 use super::crs_of;
 use crate::args::{PluginSearch, PriorFrom, Update};
-use crate::commands::localize::pose_text;
 use crate::commands::review::{Review, repeated};
+use crate::conflict::refused;
 use crate::console::{Console, Stage};
-use crate::document;
-use crate::failure::{Failure, NOTHING, UNRELIABLE};
+use crate::failure::Failure;
 use crate::matching::MatchingTool;
+use crate::out_file::delivered;
 use crate::prior::{Placed, read_placed};
 use crate::report::{Reports, Seen, Sheet};
 use crate::segment::Segmenting;
@@ -16,28 +19,29 @@ use jiff::Timestamp;
 use resurvey_core::capture::{Capture, GivenPose, read_given_pose};
 use resurvey_core::crs::Crs;
 use resurvey_core::localize::{GateLimits, Located, Matching, SceneServices, World, localize};
-use resurvey_core::plugin::{Detector, Estimator, Kind, PluginInfo};
+use resurvey_core::plugin::{Detector, Estimator, Kind};
 use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::{History, Made, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
-    BoxMm, Decision, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction, VersionId,
-    VersionKind,
+    BoxMm, Decision, Delta, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction,
+    VersionId, VersionKind,
 };
 use resurvey_schema::{Localization, Pose};
 use serde_json::{Map, Value, json};
 use std::path::Path;
+use tally::Tally;
 
-/// Updates the map with every capture in turn. The exit code is 0 when any of them changed something, else that of the
-/// last one that did not.
+/// Updates the map with every capture in turn. The exit code is 21 when one of them met a conflict, else 0 when any changed
+/// something, else that of the last one.
 pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) -> Result<u8, Failure> {
     refuse_one_for_several(options)?;
+    console.listen();
     let mut tools = Tools::load(options, plugins)?;
     let map = if options.dry_run { MapFile::open_read_only(&options.map)? } else { MapFile::open(&options.map)? };
     let given = options.pose.as_deref().map(read_given_pose).transpose()?;
     let mut reports = options.report.as_deref().map(Reports::start).transpose()?;
-    let mut documents = Vec::new();
-    let mut code = Ok(NOTHING);
+    let mut tally = Tally::default();
     for (index, path) in options.captures.iter().enumerate() {
         let recording = Recording {
             dry_run: options.dry_run,
@@ -54,30 +58,28 @@ pub fn run(options: &Update, plugins: &PluginSearch, console: &mut Console<'_>) 
         };
         let is_last = index + 1 == options.captures.len();
         let mut run = Run { map: &map, crs: crs_of(&map)?, recording, timings: Map::new(), is_last };
-        match run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console) {
-            Ok((document, of_capture)) => {
-                code = code.map(|code| if documents.is_empty() || code != 0 { of_capture } else { code });
-                documents.push(document);
-            }
-            Err(mut failure) => {
-                if let Some(reports) = &mut reports {
-                    reports.add_failure(path, &failure)?;
-                }
-                documents.extend(failure.take_document());
-                code = Err(failure);
-                break;
-            }
+        let result = run.capture(path, (given, &options.prior), &mut tools, reports.as_mut(), console);
+        if let (Err(failure), Some(reports)) = (&result, &mut reports) {
+            reports.add_failure(path, failure);
+        }
+        if !tally.count(path, result, console) {
+            break;
         }
     }
-    // What the captures before a bad one came to is in the map, so it is said.
-    let is_told = code.is_ok() || !documents.is_empty();
-    if console.is_json() && is_told {
-        match documents.as_slice() {
+    if console.is_json() && tally.is_told() {
+        match tally.documents.as_slice() {
             [only] if options.captures.len() == 1 => console.document(only)?,
             several => console.document(&several)?,
         }
     }
-    code
+    let written = reports.map_or(Ok(()), Reports::finish);
+    match tally.code() {
+        Ok(code) => delivered(code, written, console),
+        Err(failure) => {
+            delivered(failure.code(), written, console)?;
+            Err(failure)
+        }
+    }
 }
 
 /// What belongs to one photo is refused with several captures.
@@ -191,6 +193,7 @@ impl Run<'_> {
         reports: Option<&mut Reports>,
         console: &mut Console<'_>,
     ) -> Result<(Value, u8), Failure> {
+        console.go_on()?;
         let photo = prior.photo.as_deref().filter(|_| tools.segmenting.is_some());
         if let Some(document) = repeated(self.map, self.recording.idempotency_key, path, photo)? {
             if !console.is_json() {
@@ -202,21 +205,29 @@ impl Run<'_> {
         let work = self.read(path, given.map(|given| given.pose), from, console)?;
         let located = self.locate(&work.world, &work.capture, given, tools, console)?;
         let (outcome, committed) = self.conclude(&work, located, given.is_some(), &mut tools.comparers, console)?;
+        if let Some(version) = committed.version {
+            console.did(format_args!("version {version} was committed"));
+        }
         let used = (tools.matcher.info(), tools.comparers.used.as_slice());
-        let (document, code) = self.report(path, &work, &outcome, &committed, used, console)?;
+        let told = self.told(path, &work, &outcome, &committed, used)?;
+        if !console.is_json() {
+            told::summary(path, &told.document, &outcome, console)?;
+            console.out().flush()?;
+        }
         if let Some(reports) = reports {
             reports.add(&Sheet {
                 path,
                 map: self.map.path(),
-                document: &document,
+                document: &told.document,
+                changes: &told.own,
                 capture: &work.capture,
                 world: &work.world,
                 located: &outcome.located,
                 resolution: &outcome.resolution,
                 seen: outcome.seen.as_ref(),
-            })?;
+            });
         }
-        Ok((document, code))
+        Ok((told.document, told.code))
     }
 
     /// Reads the capture at `path` and the map around it.
@@ -230,8 +241,9 @@ impl Run<'_> {
         let base = self.map.head()?;
         let snapshot = self.map.snapshot(base)?;
         let stage = console.stage("read");
-        let Placed { capture, world, prior } = read_placed(path, from, given, (&snapshot, self.crs), console)?;
+        let placed = read_placed(path, from, given, (&snapshot, self.crs), console);
         self.timings.insert("read".to_owned(), json!(console.finish(&stage)));
+        let Placed { capture, world, prior } = placed?;
         Ok(Work { base, capture, world, prior })
     }
 
@@ -255,10 +267,11 @@ impl Run<'_> {
             comparers.detector.finish()?;
             comparers.estimator.finish()?;
         }
+        console.go_on()?;
         let stage = console.stage("commit");
-        let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used)?;
+        let committed = self.commit(work.base, &work.capture, is_given, &outcome, &comparers.used);
         self.timings.insert("commit".to_owned(), json!(console.finish(&stage)));
-        Ok((outcome, committed))
+        Ok((outcome, committed?))
     }
 
     fn locate(
@@ -274,11 +287,12 @@ impl Run<'_> {
         }
         let stage = console.stage("localize");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search)?;
-        if self.is_last {
-            tools.matcher.finish()?;
-        }
+        let located = localize(&mut tools.matcher, &services, &tools.choices.gate, &tools.choices.search);
+        let ended = if self.is_last && located.is_ok() { tools.matcher.finish() } else { Ok(()) };
+        // What the matcher said comes before why it failed.
         self.timings.insert("localize".to_owned(), json!(console.finish(&stage)));
+        let located = located?;
+        ended?;
         Ok(located)
     }
 
@@ -302,12 +316,14 @@ impl Run<'_> {
         time("view", console, &stage);
         let stage = console.stage("detect");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let regions = comparison.detect(&mut comparers.detector, &services)?;
+        let regions = comparison.detect(&mut comparers.detector, &services);
         time("detect", console, &stage);
+        let regions = regions?;
         let stage = console.stage("estimate");
         let services = SceneServices::new(world, capture, self.crs, &stage);
-        let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions)?;
+        let proposals = comparison.estimate(&mut comparers.estimator, &services, &regions);
         time("estimate", console, &stage);
+        let proposals = proposals?;
         let resolution = resolve(proposals.clone(), &regions, world.descriptors());
         let viewed_region = comparison.viewed_region();
         Ok((resolution, viewed_region, Seen { view, regions, proposals }))
@@ -347,10 +363,11 @@ impl Run<'_> {
         transaction.idempotency_key = self.recording.idempotency_key.map(ToOwned::to_owned);
         transaction.request = Some(capture.digest);
         add_changes(&mut transaction, &outcome.resolution.changes);
-        let Made { version, repeated } = self.map.commit_once(&transaction, now)?;
+        let committed = self.map.commit_once(&transaction, now);
+        let Made { version, repeated } = committed.map_err(|error| refused(error, self.map, &transaction.deltas))?;
         let changes = self.map.changes_of(version)?;
         let fids = changes.iter().filter(|delta| delta.before().is_none()).map(|delta| delta.fid().0).collect();
-        Ok(Committed { decision, version: Some(version), fids, proposals: Vec::new(), repeated })
+        Ok(Committed { version: Some(version), fids, repeated, ..Committed::nothing(decision) })
     }
 
     fn evidence(
@@ -364,6 +381,7 @@ impl Run<'_> {
         let (localization, matcher) = (&outcome.located.localization, Kind::Matcher.to_string());
         Observation {
             capture: capture.digest,
+            photo: Some(capture.photo_digest()),
             taken_at: capture.taken_at,
             labels: self.recording.keep_labels.then(|| capture.label_bytes.clone()),
             prior: Some(capture.prior),
@@ -384,53 +402,6 @@ impl Run<'_> {
             confirmations: Vec::new(),
         }
     }
-
-    fn report(
-        &self,
-        path: &Path,
-        work: &Work,
-        outcome: &Outcome,
-        committed: &Committed,
-        (matcher, used): (&PluginInfo, &[PluginUse]),
-        console: &mut Console<'_>,
-    ) -> Result<(Value, u8), Failure> {
-        let snapshot = self.map.snapshot(work.base)?;
-        let classes = snapshot.classes();
-        let mut fids = committed.fids.iter().copied();
-        let changes: Vec<Value> = (outcome.resolution.changes.iter())
-            .map(|change| {
-                let fid = if matches!(change, Change::Add(_)) { fids.next() } else { None };
-                document::change(change, fid, classes)
-            })
-            .collect();
-        let (decision, code) = match committed.decision {
-            Decision::Unreliable => ("unreliable", UNRELIABLE),
-            Decision::Nothing => ("nothing", NOTHING),
-            _ if self.recording.dry_run => ("dry-run", 0),
-            Decision::Proposed => ("proposed", 0),
-            _ => ("committed", 0),
-        };
-        let rejections = outcome.resolution.rejections.iter();
-        let mut document = json!({
-            "capture": path.display().to_string(),
-            "base_version": work.base.0,
-            "version": committed.version.map(|version| version.0),
-            "decision": decision,
-            "localization": document::located(&outcome.located, matcher, self.crs, (&work.prior, &self.timings)),
-            "changes": changes,
-            "rejections": rejections.map(|rejection| document::rejection(rejection, classes)).collect::<Vec<_>>(),
-            "plugins": used.iter().map(document::plugin_use).collect::<Vec<_>>(),
-            "timings_ms": self.timings,
-        });
-        if !committed.proposals.is_empty() {
-            document["proposals"] = json!(committed.proposals);
-        }
-        document::say_repeated(&mut document, committed.repeated);
-        if !console.is_json() {
-            summary(path, &document, outcome, console)?;
-        }
-        Ok((document, code))
-    }
 }
 
 /// What became of the changes.
@@ -439,13 +410,25 @@ pub(super) struct Committed {
     pub(super) version: Option<VersionId>,
     pub(super) fids: Vec<u64>,
     pub(super) proposals: Vec<u64>,
+    /// Those of the proposals that somebody decided before, and how.
+    pub(super) decided: Vec<(u64, &'static str)>,
+    /// What the version did, where that is not what this capture saw alone.
+    pub(super) did: Option<Vec<Delta>>,
     /// Whether the same request made the version before.
     pub(super) repeated: bool,
 }
 
 impl Committed {
-    fn nothing(decision: Decision) -> Self {
-        Self { decision, version: None, fids: Vec::new(), proposals: Vec::new(), repeated: false }
+    pub(super) fn nothing(decision: Decision) -> Self {
+        Self {
+            decision,
+            version: None,
+            fids: Vec::new(),
+            proposals: Vec::new(),
+            decided: Vec::new(),
+            did: None,
+            repeated: false,
+        }
     }
 }
 
@@ -489,52 +472,4 @@ pub(super) fn message_of(changes: &[Change]) -> String {
     let modified = count(|change| matches!(change, Change::Modify { .. }));
     let removed = count(|change| matches!(change, Change::Remove { .. }));
     format!("update: {added} added, {modified} modified, {removed} removed")
-}
-
-fn summary(path: &Path, document: &Value, outcome: &Outcome, console: &mut Console<'_>) -> Result<(), Failure> {
-    let decision = document["decision"].as_str().unwrap_or_default();
-    let version = document["version"].as_u64().map_or_else(String::new, |version| format!(", version {version}"));
-    console.line(format_args!("{}: {decision}{version}", path.display()))?;
-    for id in document["proposals"].as_array().into_iter().flatten() {
-        console.line(format_args!("  proposal  {id}"))?;
-    }
-    console.line(format_args!("  pose      {}", pose_text(&outcome.located.localization.pose)))?;
-    for reason in &outcome.located.reasons {
-        console.line(format_args!("  doubt     {reason}"))?;
-    }
-    for change in document["changes"].as_array().into_iter().flatten() {
-        let (op, class) = (change["op"].as_str().unwrap_or_default(), change["class"].as_str().unwrap_or_default());
-        let fid = change["fid"].as_u64().map_or_else(String::new, |fid| format!(" {fid}"));
-        let state = if change["after"].is_null() { &change["before"] } else { &change["after"] };
-        console.line(format_args!("  {op:9} {class}{fid} {}", place(state)))?;
-    }
-    for rejection in document["rejections"].as_array().into_iter().flatten() {
-        let text = |key: &str| rejection[key].as_str().unwrap_or_default().to_owned();
-        let number = |key: &str| rejection[key].as_f64().unwrap_or_default();
-        console.line(format_args!(
-            "  rejected  {} -> {}, {} px: {} is {:.3} {}, limit {:.3}",
-            text("class_before"),
-            text("class_after"),
-            number("pixels"),
-            text("requirement"),
-            number("measured"),
-            text("unit"),
-            number("limit"),
-        ))?;
-    }
-    Ok(())
-}
-
-/// Where a descriptor is and how large, in a few words.
-fn place(state: &Value) -> String {
-    let at = if state["centre"].is_null() { &state["position"] } else { &state["centre"] };
-    let number = |value: &Value| value.as_f64().unwrap_or_default();
-    let mut text = format!("at E {:.2} N {:.2} H {:.2}", number(&at[0]), number(&at[1]), number(&at[2]));
-    if let (Some(width), Some(height)) = (state["width_m"].as_f64(), state["height_m"].as_f64()) {
-        text += &format!(", {width:.2} x {height:.2} m");
-    }
-    if let Some(sigma) = state["sigma_m"].as_f64() {
-        text += &format!(", 1 sigma {sigma:.2} m");
-    }
-    text
 }

@@ -42,12 +42,19 @@ pub fn outcome(sheet: &Sheet<'_>) -> String {
     let changed = counted(changes.len(), "change", "changes");
     match text(&sheet.document["decision"]) {
         "unreliable" => "The pose is not reliable, so nothing was compared and the map stays as it is.".to_owned(),
+        "nothing" if !changes.is_empty() => {
+            format!("{changed} proposed before and decided: nothing waits, {rejected}.")
+        }
         "nothing" if sheet.resolution.rejections.is_empty() => "No change was found: nothing to update.".to_owned(),
         "nothing" => format!("Nothing to update: {rejected}."),
         "dry-run" => format!("A dry run: {changed} would be made, {rejected}; the map stays as it is."),
         "proposed" => format!("{changed} proposed for review, {rejected}."),
         _ => match sheet.document["version"].as_u64() {
-            Some(version) => format!("{changed} committed as version {version}, {rejected}."),
+            Some(version) => {
+                let committed = sheet.document["changes"].as_array().map_or(0, Vec::len);
+                let changed = counted(committed, "change", "changes");
+                format!("{changed} committed as version {version}, {rejected}.")
+            }
             None => format!("{changed}, {rejected}."),
         },
     }
@@ -167,7 +174,7 @@ fn became(sheet: &Sheet<'_>, seen: &Seen, fates: &[Fate]) -> Markup {
             div class="fate" {
                 @match fate {
                     Fate::Changed(index) => {
-                        @let change = &sheet.document["changes"][*index];
+                        @let change = &sheet.changes[*index];
                         span class="yes" { "kept" } ": " (text(&change["op"])) " " (text(&change["class"]))
                         @if let Some(fid) = change["fid"].as_u64() { " " (fid) }
                     },
@@ -192,7 +199,7 @@ fn changes(sheet: &Sheet<'_>) -> Result<Markup, Failure> {
             Some(bounds) => overlay.detail(&pictures.part(bounds)?, bounds, change),
             None => html! {},
         };
-        cards.push(numbers::change(&sheet.document["changes"][index], index + 1, &detail));
+        cards.push(numbers::change(&sheet.changes[index], index + 1, &detail));
     }
     Ok(html! { div class="changes" { @for card in &cards { (card) } } })
 }

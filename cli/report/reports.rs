@@ -2,9 +2,10 @@
 
 use super::index::{self, Entry};
 use super::page;
+use super::section::GENERATED;
 use super::sheet::Sheet;
-use crate::commands::write_file;
 use crate::failure::Failure;
+use crate::out_file::{make_directory, write_file};
 use std::path::{Path, PathBuf};
 
 /// The reports of one run.
@@ -13,32 +14,54 @@ pub struct Reports {
     /// Names that are taken, in lower case: some file systems do not tell cases apart.
     taken: Vec<String>,
     entries: Vec<Entry>,
+    /// What could not be written first.
+    failed: Option<Failure>,
 }
 
 impl Reports {
     /// Reports in `directory`, which is made when it is missing: what cannot be written is said before a map changes.
     pub fn start(directory: &Path) -> Result<Self, Failure> {
-        let wrong = |error: std::io::Error| Failure::input(format!("{}: {error}", directory.display()));
-        std::fs::create_dir_all(directory).map_err(wrong)?;
-        let mut reports =
-            Self { directory: directory.to_owned(), taken: vec!["index".to_owned()], entries: Vec::new() };
+        make_directory(directory)?;
+        refuse_others(&directory.join("index.html"))?;
+        let mut reports = Self {
+            directory: directory.to_owned(),
+            taken: vec!["index".to_owned()],
+            entries: Vec::new(),
+            failed: None,
+        };
         reports.write_index()?;
         Ok(reports)
     }
 
-    /// Writes the page of a capture, and the index anew.
-    pub fn add(&mut self, sheet: &Sheet<'_>) -> Result<(), Failure> {
+    /// Writes the page of a capture, and the index anew. What cannot be written is kept for [`Self::finish`]: the capture
+    /// is in the map whatever becomes of its page.
+    pub fn add(&mut self, sheet: &Sheet<'_>) {
+        let written = self.write(sheet);
+        self.note(written);
+    }
+
+    /// Says in the index that the run met a capture that could not be worked on.
+    pub fn add_failure(&mut self, path: &Path, failure: &Failure) {
+        let name = self.free_name(path);
+        self.entries.push(Entry::failed(name, path, failure));
+        let written = self.write_index();
+        self.note(written);
+    }
+
+    /// What could not be written first.
+    pub fn finish(self) -> Result<(), Failure> {
+        self.failed.map_or(Ok(()), Err)
+    }
+
+    fn note(&mut self, written: Result<(), Failure>) {
+        self.failed = self.failed.take().or(written.err());
+    }
+
+    fn write(&mut self, sheet: &Sheet<'_>) -> Result<(), Failure> {
         let name = self.free_name(sheet.path);
         let file = format!("{name}.html");
         write_file(&self.directory.join(&file), page::page(sheet, &name)?.as_bytes())?;
         self.entries.push(Entry::of(sheet, name, file)?);
-        self.write_index()
-    }
-
-    /// Says in the index that the run ended at a capture that could not be worked on.
-    pub fn add_failure(&mut self, path: &Path, failure: &Failure) -> Result<(), Failure> {
-        let name = self.free_name(path);
-        self.entries.push(Entry::failed(name, path, failure));
         self.write_index()
     }
 
@@ -54,6 +77,17 @@ impl Reports {
         let name = std::iter::once(wanted.clone()).chain(numbered).find(is_free).unwrap_or(wanted);
         self.taken.push(name.to_lowercase());
         name
+    }
+}
+
+/// Refuses to write over a page that is not one of these.
+fn refuse_others(index: &Path) -> Result<(), Failure> {
+    match std::fs::read(index) {
+        Ok(page) if !String::from_utf8_lossy(&page).contains(GENERATED) => Err(Failure::input(format!(
+            "{}: expected a directory for reports, found a page of somebody else; name a directory of its own",
+            index.display()
+        ))),
+        _ => Ok(()),
     }
 }
 

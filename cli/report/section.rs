@@ -6,6 +6,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
 
+/// What is in the head of every page and of none of others.
+pub const GENERATED: &str = "<meta name=\"generator\" content=\"resurvey\">";
+
 /// A whole document.
 pub fn document(title: &str, body: &Markup) -> Markup {
     html! {

@@ -26,6 +26,8 @@ pub struct Sheet<'a> {
     pub map: &'a Path,
     /// What `update --json` prints.
     pub document: &'a Value,
+    /// What the capture saw change, in the order of `resolution`.
+    pub changes: &'a [Value],
     /// The capture.
     pub capture: &'a Capture,
     /// The map around it before the update.

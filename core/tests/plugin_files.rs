@@ -113,7 +113,7 @@ fn a_setting_that_is_misspelt_is_refused_before_c_code_sees_it() {
 #[test]
 fn a_plugin_of_another_abi_is_refused_with_what_to_do() {
     let Some(fixtures) = fixtures() else { return };
-    let expected = "refused libother.so at abi: plugin speaks ABI 2.0, this host speaks 1.0 to 1.0 · \
+    let expected = "refused libother.so at abi: plugin speaks ABI 2.0, this host speaks 1.0 to 1.1 · \
                     upgrade resurvey, or install a build for ABI 1";
     assert_eq!(refusal(&fixtures.broken("other", &["-DMAJOR=2"])), (Stage::Abi, expected.to_owned()));
     let renamed = fixtures.broken("other", &["-DSYMBOL=resurvey_plugin_v3__broken"]);
@@ -124,7 +124,7 @@ fn a_plugin_of_another_abi_is_refused_with_what_to_do() {
 fn every_other_way_to_be_broken_has_its_gate_and_its_words() {
     let Some(fixtures) = fixtures() else { return };
     let cases: &[(&[&str], Stage, &str)] = &[
-        (&["-DMIN_HOST=9"], Stage::Abi, "plugin needs a host of ABI 1.9, this host speaks 1.0 to 1.0"),
+        (&["-DMIN_HOST=9"], Stage::Abi, "plugin needs a host of ABI 1.9, this host speaks 1.0 to 1.1"),
         (&["-DKIND=9"], Stage::Abi, "plugin is of kind 9, this host knows 1 (matcher)"),
         (&["-DMAGIC={0}"], Stage::Header, "expected the letters RESURVEY, found \\x00"),
         (&["-DSIZE=64"], Stage::Header, "expected a declaration of at least 272 bytes, found 64"),

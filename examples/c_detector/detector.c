@@ -14,9 +14,6 @@
 #include "resurvey_plugin.h"
 #include <stdlib.h>
 
-#define VOID_CLASS 255
-#define KIND_IGNORED 2
-
 /* How a pixel differs: somehow, or by more than the tolerance. */
 #define DIFFERS 1
 #define CERTAIN 2
@@ -37,25 +34,12 @@ struct rsv_instance {
   uint32_t least_px, tolerance_px;
 };
 
-/* The whole number behind "name": in the settings. The host writes them without spaces and none is missing, so that a plugin
- * with two numbers needs no JSON library. The text has no zero at its end: `length` is all there is. */
-static uint32_t whole_number(rsv_text settings, const char *name) {
-  size_t length = strlen(name);
-  uint32_t value = 0;
-  for (size_t i = 0; i + length < settings.length; i++) {
-    if (memcmp(settings.data + i, name, length)) continue;
-    for (i += length; i < settings.length && settings.data[i] >= '0' && settings.data[i] <= '9'; i++)
-      value = 10 * value + (uint32_t)(settings.data[i] - '0');
-    break;
-  }
-  return value;
-}
-
 static rsv_status create(rsv_text settings, rsv_instance **instance, rsv_error *error) {
   rsv_instance *made = malloc(sizeof *made);
   if (!made) return rsv_fail(error, "out of memory");
-  made->least_px = whole_number(settings, "\"least_px\":");
-  made->tolerance_px = whole_number(settings, "\"tolerance_px\":");
+  /* The header reads settings, so that a plugin with two numbers needs no JSON library. */
+  made->least_px = (uint32_t)rsv_setting_number(settings, "least_px");
+  made->tolerance_px = (uint32_t)rsv_setting_number(settings, "tolerance_px");
   *instance = made;
   return RSV_OK;
 }
@@ -66,9 +50,7 @@ static void destroy(rsv_instance *instance) { free(instance); }
 /* ---- images ------------------------------------------------------------------------------------------------------------ */
 
 /* A row of an image of classes. Rows may be padded: never data + row * width. */
-static const uint8_t *row_of(const rsv_image *image, uint32_t row) {
-  return (const uint8_t *)image->data + row * image->row_bytes;
-}
+static const uint8_t *row_of(const rsv_image *image, uint32_t row) { return (const uint8_t *)rsv_row(image, row); }
 
 /* What a call works on: allocated in detect and freed there, whatever happens in between. */
 typedef struct work {
@@ -173,12 +155,12 @@ static rsv_status compare(const rsv_instance *instance, const rsv_services *serv
                           work *work) {
   uint8_t is_compared[256] = {0};
   for (size_t i = 0; i < services->class_count; i++)
-    is_compared[services->classes[i].index] = services->classes[i].kind != KIND_IGNORED;
+    is_compared[services->classes[i].index] = services->classes[i].kind != RSV_CLASS_IGNORED;
   for (uint32_t v = 0; v < work->height; v++) {
     const uint8_t *in_photo = row_of(&comparison->photo, v), *in_view = row_of(&comparison->view->labels, v);
     for (uint32_t u = 0; u < work->width; u++)
       work->differs[(size_t)v * work->width + u] =
-          in_photo[u] != VOID_CLASS && in_photo[u] != in_view[u] && is_compared[in_photo[u]] ? CERTAIN : 0;
+          in_photo[u] != RSV_VOID && in_photo[u] != in_view[u] && is_compared[in_photo[u]] ? CERTAIN : 0;
   }
   for (size_t i = 0; i < services->class_count; i++) {
     /* Between two classes is often enough to return within 200 ms of a cancel. */

@@ -1,7 +1,9 @@
 // A matcher in C++17: agreement of the classes beyond what chance gives (Cohen's kappa). Photos that are one half sky agree
 // with every view that is one half sky; kappa does not count that.
 //
-// Build: c++ -std=c++17 -O2 -g -Wall -Wextra -fPIC -shared -fvisibility=hidden -I schema/include examples/cpp_matcher/matcher.cpp -o libkappa.so
+// -fno-gnu-unique (GCC's alone) and --exclude-libs keep what the standard library instantiates in here apart from that of others.
+//
+// Build: c++ -std=c++17 -O2 -g -Wall -Wextra -fPIC -shared -fvisibility=hidden -fno-gnu-unique -Wl,--exclude-libs,ALL -I schema/include examples/cpp_matcher/matcher.cpp -o libkappa.so
 // Check: resurvey plugins check libkappa.so
 
 #include "resurvey_plugin.h"
@@ -16,8 +18,6 @@
 
 namespace {
 
-constexpr std::uint8_t void_class = 255;
-
 // The host checks settings against this schema, fills in what the user did not say, and hands over all of them.
 constexpr std::string_view schema = R"({"type": "object", "additionalProperties": false, "properties": {
   "compare_sky": {"type": "boolean", "default": true, "description": "Whether pixels that are sky in both count."},
@@ -30,7 +30,7 @@ class Image {
   explicit Image(const rsv_image& image) : image_(image) {}
   std::uint32_t height() const { return image_.height; }
   const Value* begin(std::uint32_t row) const {
-    return reinterpret_cast<const Value*>(static_cast<const std::byte*>(image_.data) + row * image_.row_bytes);
+    return static_cast<const Value*>(rsv_row(&image_, row));
   }
   const Value* end(std::uint32_t row) const { return begin(row) + image_.width; }
 
@@ -59,26 +59,17 @@ rsv_status guarded(rsv_error* error, Body body) noexcept {
   return RSV_PANICKED;
 }
 
-// Settings are one line of JSON, sorted by name and without spaces, and every one is there.
-std::string_view setting(std::string_view settings, std::string_view key) {
-  const std::size_t at = settings.find(key);
-  if (at == std::string_view::npos) throw std::logic_error("a setting of the schema is missing");
-  settings.remove_prefix(at + key.size());
-  return settings.substr(0, settings.find_first_of(",}"));
-}
-
 }  // namespace
 
 // What the header calls an instance is ours to define.
 struct rsv_instance {
-  bool compare_sky = true;
-  std::uint8_t sky = 6;
+  bool compare_sky;
+  std::uint8_t sky;
 
-  explicit rsv_instance(std::string_view settings) : compare_sky(setting(settings, "\"compare_sky\":") == "true") {
-    unsigned value = 0;
-    for (const char digit : setting(settings, "\"sky_class\":")) value = 10 * value + static_cast<unsigned>(digit - '0');
-    sky = static_cast<std::uint8_t>(value);
-  }
+  // The header reads settings, so that a few numbers need no JSON library.
+  explicit rsv_instance(rsv_text settings)
+      : compare_sky(rsv_setting_is_true(settings, "compare_sky") != 0),
+        sky(static_cast<std::uint8_t>(rsv_setting_number(settings, "sky_class"))) {}
 
   double score(const Image<std::uint8_t>& photo, const Image<std::uint8_t>& view) const {
     std::array<std::uint64_t, 256> in_photo{}, in_view{};
@@ -86,7 +77,7 @@ struct rsv_instance {
     for (std::uint32_t row = 0; row < photo.height(); row++) {
       const std::uint8_t* b = view.begin(row);
       for (const std::uint8_t* a = photo.begin(row); a != photo.end(row); ++a, ++b) {
-        if (*a == void_class || (!compare_sky && *a == sky && *b == sky)) continue;
+        if (*a == RSV_VOID || (!compare_sky && *a == sky && *b == sky)) continue;
         compared++, in_photo[*a]++, in_view[*b]++;
         same += *a == *b;
       }
@@ -104,7 +95,7 @@ struct rsv_instance {
 extern "C" {
 
 static rsv_status create(rsv_text settings, rsv_instance** instance, rsv_error* error) {
-  return guarded(error, [&] { *instance = std::make_unique<rsv_instance>(std::string_view(settings.data, settings.length)).release(); });
+  return guarded(error, [&] { *instance = std::make_unique<rsv_instance>(settings).release(); });
 }
 
 static void destroy(rsv_instance* instance) { delete instance; }

@@ -1,4 +1,4 @@
-/* resurvey plugin line, version 1.0.
+/* resurvey plugin line, version 1.1.
  *
  * A plugin is a shared library with ONE exported data symbol, an rsv_declaration. The host reads its first bytes from
  * the file before any code of the plugin runs, opens the library, calls `entry` once, and then the functions that entry
@@ -30,6 +30,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #ifdef __cplusplus
@@ -37,7 +38,7 @@ extern "C" {
 #endif
 
 #define RSV_ABI_MAJOR 1
-#define RSV_ABI_MINOR 0
+#define RSV_ABI_MINOR 1 /* 1: segmenters */
 
 /* Every function of the line uses the C calling convention of the platform. */
 #ifdef _WIN32
@@ -58,6 +59,18 @@ typedef int32_t rsv_status;
 #define RSV_KIND_DETECTOR 2
 #define RSV_KIND_ESTIMATOR 3
 #define RSV_KIND_SEGMENTER 4
+
+/* Kinds of class, models of camera, levels of the log, and the class of a pixel that is not labelled. */
+#define RSV_CLASS_MATERIAL 0
+#define RSV_CLASS_DYNAMIC 1
+#define RSV_CLASS_IGNORED 2
+#define RSV_CAMERA_PINHOLE 0
+#define RSV_CAMERA_BROWN 1   /* k1 k2 p1 p2 k3, in OpenCV's order */
+#define RSV_CAMERA_FISHEYE 2 /* k1 k2 k3 k4, in OpenCV's order */
+#define RSV_LOG_WARNING 0
+#define RSV_LOG_INFO 1
+#define RSV_LOG_DEBUG 2
+#define RSV_VOID 255
 
 /* ---- frozen records ------------------------------------------------------------------------------------------------ */
 
@@ -102,7 +115,7 @@ typedef struct rsv_class {
   rsv_text name;
   double size_m[3]; /* along, across, up; zero unless dynamic */
   uint8_t index;    /* value in label images */
-  uint8_t kind;     /* 0 material, 1 dynamic, 2 ignored */
+  uint8_t kind;     /* RSV_CLASS_ */
   uint8_t colour[3];
   uint8_t reserved[3];
 } rsv_class;
@@ -155,7 +168,7 @@ typedef struct rsv_host_info {
 
 typedef struct rsv_camera {
   uint32_t size;
-  uint32_t model;       /* 0 pinhole, 1 Brown (k1 k2 p1 p2 k3), 2 fisheye (k1 k2 k3 k4), in OpenCV's order */
+  uint32_t model;       /* RSV_CAMERA_ */
   uint32_t width, height;
   double fx, fy, cx, cy; /* pixels */
   double distortion[5];
@@ -378,7 +391,7 @@ typedef struct rsv_services {
   rsv_status (*wgs84_from_grid)(void *context, const rsv_point *point, rsv_wgs84 *position, rsv_error *error);
   /* run(task, 0) to run(task, count - 1) on the host's threads, several at once; returns when all are done. */
   rsv_status (*parallel_for)(void *context, size_t count, void *task, rsv_task run, rsv_error *error);
-  void (*log)(void *context, uint32_t level, rsv_text text); /* 0 warning, 1 info, 2 debug */
+  void (*log)(void *context, uint32_t level, rsv_text text); /* level: RSV_LOG_ */
   void (*progress)(void *context, double fraction);          /* 0 to 1 */
   uint32_t (*cancelled)(void *context);                      /* 1: return soon */
 } rsv_services;
@@ -397,7 +410,8 @@ typedef struct rsv_table {
    * "integer" | "boolean" | "string", "default": ..., "minimum", "maximum", "enum", "description"}, ...}}. Empty: no
    * settings. Lives as long as the library. */
   rsv_text settings_schema;
-  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. */
+  /* settings is a JSON object with every setting of the schema, checked, sorted by name, written without spaces. With
+   * anything but RSV_OK there is no instance: the host does not call destroy, whatever *instance is. */
   rsv_status (*create)(rsv_text settings, rsv_instance **instance, rsv_error *error);
   /* Once per instance; also after RSV_PANICKED. */
   void (*destroy)(rsv_instance *instance);
@@ -432,8 +446,9 @@ typedef struct rsv_header {
 typedef rsv_status (*rsv_entry)(const rsv_host_info *host, rsv_table *table, rsv_error *error);
 
 /* Export exactly one, under the name resurvey_plugin_v1__X, X any letters, digits and underscores of your own: two
- * plugins may be linked into one program. Build with -fvisibility=hidden, so that nothing else is exported. C++ keeps a
- * const to its own file: declare it first, within extern "C":
+ * plugins may be linked into one program. Build with -fvisibility=hidden, so that nothing else is exported; in C++ with
+ * -fno-gnu-unique (GCC) and -Wl,--exclude-libs,ALL as well, or templates of the standard library are. C++ keeps a const to
+ * its own file: declare it first, within extern "C":
  *   RSV_EXPORT extern const rsv_declaration resurvey_plugin_v1__X; */
 typedef struct rsv_declaration {
   rsv_header header;
@@ -445,8 +460,8 @@ typedef struct rsv_declaration {
 
 #define RSV_HEADER(kind_)                                                                                              \
   {                                                                                                                    \
-    {'R', 'E', 'S', 'U', 'R', 'V', 'E', 'Y'}, RSV_ABI_MAJOR, RSV_ABI_MINOR, sizeof(rsv_declaration), 0, (kind_), 0,    \
-    { 0 }                                                                                                              \
+    {'R', 'E', 'S', 'U', 'R', 'V', 'E', 'Y'}, RSV_ABI_MAJOR, RSV_ABI_MINOR, sizeof(rsv_declaration),                   \
+    (kind_) == RSV_KIND_SEGMENTER, (kind_), 0, { 0 }                                                                   \
   }
 
 /* Whether the struct behind a pointer reaches as far as a field: that of an older host may end before it.
@@ -471,6 +486,83 @@ static inline rsv_status rsv_fail(rsv_error *error, const char *text) {
     error->length = (uint32_t)length;
   }
   return RSV_FAILED;
+}
+
+/* The first value of a row. Rows may be padded: data + row * width is wrong.
+ *   const uint8_t *classes = (const uint8_t *)rsv_row(photo, v); */
+static inline const void *rsv_row(const rsv_image *image, uint32_t row) {
+  return (const char *)image->data + row * image->row_bytes;
+}
+
+/* The class that the map calls so, such as "banner"; null when it has none. */
+static inline const rsv_class *rsv_class_named(const rsv_services *services, const char *name) {
+  size_t length = strlen(name);
+  for (size_t i = 0; i < services->class_count; i++) {
+    const rsv_class *one = &services->classes[i];
+    if (one->name.length == length && !memcmp(one->name.data, name, length)) return one;
+  }
+  return NULL;
+}
+
+/* ---- settings in create, without a JSON library --------------------------------------------------------------------- */
+
+/* What stands behind "name": as it is written; data is null when the schema does not have it. */
+static inline rsv_text rsv_setting(rsv_text settings, const char *name) {
+  size_t length = strlen(name);
+  rsv_text value = {NULL, 0};
+  /* A quote within a text has a backslash before it, so that this is found where the name of a setting stands alone. */
+  for (size_t i = 0; i + length + 3 < settings.length; i++) {
+    const char *at = settings.data + i;
+    if (at[0] != '"' || memcmp(at + 1, name, length) || at[length + 1] != '"' || at[length + 2] != ':') continue;
+    value.data = at + length + 3;
+    int is_text = *value.data == '"';
+    size_t left = settings.length - i - length - 3, end = is_text ? 1 : 0;
+    while (end < left && (is_text ? value.data[end] != '"' : value.data[end] != ',' && value.data[end] != '}'))
+      end += value.data[end] == '\\' ? 2 : 1;
+    value.length = end + (is_text ? 1 : 0) < left ? end + (is_text ? 1 : 0) : left;
+    return value;
+  }
+  return value;
+}
+
+/* The number of a setting; 0 where it is none. */
+static inline double rsv_setting_number(rsv_text settings, const char *name) {
+  rsv_text value = rsv_setting(settings, name);
+  char digits[40] = {0}; /* the text has no zero at its end, which strtod needs */
+  if (value.data) memcpy(digits, value.data, value.length < sizeof digits ? value.length : sizeof digits - 1);
+  return strtod(digits, NULL);
+}
+
+/* 1 when a setting is true. */
+static inline int rsv_setting_is_true(rsv_text settings, const char *name) {
+  rsv_text value = rsv_setting(settings, name);
+  return value.length == 4 && !memcmp(value.data, "true", 4);
+}
+
+/* Writes the text of a setting with a zero at its end, such as the path of a file, and gives its length; when that is
+ * capacity or more, it was cut. */
+static inline size_t rsv_setting_text(rsv_text settings, const char *name, char *to, size_t capacity) {
+  static const char escaped[] = "bfnrt", meant[] = "\b\f\n\r\t";
+  rsv_text value = rsv_setting(settings, name);
+  size_t length = 0;
+  for (size_t i = 1; i + 1 < value.length; i++) {
+    char one = value.data[i];
+    if (one == '\\' && i + 2 < value.length) {
+      one = value.data[++i];
+      const char *escape = strchr(escaped, one);
+      if (escape) one = meant[escape - escaped];
+      if (one == 'u' && i + 5 < value.length) { /* the host escapes nothing but control characters so */
+        char digits[5] = {0};
+        memcpy(digits, value.data + i + 1, 4);
+        one = (char)strtoul(digits, NULL, 16);
+        i += 4;
+      }
+    }
+    if (length + 1 < capacity) to[length] = one;
+    length++;
+  }
+  if (capacity) to[length < capacity ? length : capacity - 1] = 0;
+  return length;
 }
 
 #ifdef __cplusplus

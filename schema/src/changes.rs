@@ -1,14 +1,17 @@
 //! Change sets (`resurvey.changes/1`, JSON lines) and the JSON form of a descriptor.
 
+use crate::class::ClassId;
 use crate::position::GridPoint;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Value of `format` in the header line.
 pub const FORMAT: &str = "resurvey.changes/1";
 
 /// First line of a change set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a header, {\"format\": …}")]
 pub struct ChangeSetHeader {
     /// Always [`FORMAT`].
     pub format: String,
@@ -23,6 +26,16 @@ pub struct ChangeSetHeader {
     /// When the world was so, a time with its zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observed_at: Option<String>,
+    /// The map it was made from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map_id: Option<String>,
+    /// Hash of `base_version` in that map, 64 hexadecimal digits: in a map where that version has another one,
+    /// `base_version` says nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_hash: Option<String>,
+    /// Index of each class by name in that map: geometry has indices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub classes: Option<BTreeMap<String, ClassId>>,
 }
 
 /// What an operation does.
@@ -39,7 +52,7 @@ pub enum Op {
 
 /// One operation, one line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an operation, {\"op\": …}")]
 pub struct ChangeLine {
     /// What it does.
     pub op: Op,
@@ -85,10 +98,14 @@ pub struct ObjectFile {
 }
 
 /// A descriptor as JSON has it: material when `corners` is there, dynamic when `position` is. Derived values (`centre`,
-/// `width_m`, `height_m`, `area_m2`) are written for readers and ignored when read.
+/// `width_m`, `height_m`, `area_m2`) are written for readers and ignored when read; so is the `kind` of a state that an
+/// answer printed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a descriptor, {\"class\": …}")]
 pub struct DescriptorFile {
+    /// `material` or `dynamic`, which the other keys say too.
+    #[serde(default, skip_serializing)]
+    pub kind: Option<IgnoredAny>,
     /// Class name.
     pub class: String,
     /// Bottom-left, bottom-right, top-right, top-left, seen from outside.

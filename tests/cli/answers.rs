@@ -128,6 +128,15 @@ fn a_polygon_file_that_is_none_is_exit_10() {
         let file = bench.file("region.geojson", contents);
         bench.refuses("query", &["--polygon", &file], 10, &["region.geojson"]);
     }
+    for (contents, found) in [
+        (r#"{"type":"Point","coordinates":[835600,817800]}"#, "found a Point"),
+        (r#"{"type":"Polygon","coordinates":[]}"#, "found a Polygon without rings"),
+        (r#"{"type":"FeatureCollection","features":[]}"#, "found a collection of 0 features"),
+        (r#"{"type":"Feature","properties":null,"geometry":null}"#, "found a feature without a geometry"),
+    ] {
+        let file = bench.file("region.geojson", contents);
+        bench.refuses("query", &["--polygon", &file], 10, &["expected one GeoJSON polygon", found]);
+    }
     let swapped =
         bench.file("region.geojson", r#"{"type":"Polygon","coordinates":[[[22,114],[23,114],[23,115],[22,114]]]}"#);
     bench.refuses("query", &["--polygon", &swapped, "--wgs84"], 10, &["region.geojson"]);
@@ -243,4 +252,121 @@ fn init_and_import_say_what_they_made() {
     let log = bench.json("log", &["-n", "1"]);
     assert_eq!((&log["versions"][0]["message"], &log["versions"][0]["version"]), (&json!("survey 2026"), &json!(2)));
     assert_eq!(bench.head(), 2);
+}
+
+#[test]
+fn a_state_has_its_kind_in_every_answer_and_may_be_sent_back() {
+    let (bench, document) = Bench::with_banner();
+    let fid = document["changes"][0]["fid"].to_string();
+    let diff = bench.json("diff", &["1..2"])["changes"][0]["after"].clone();
+    let why = bench.json("why", &[&fid])["steps"][0]["after"].clone();
+    assert_eq!((&diff["kind"], &why, &document["changes"][0]["after"]), (&json!("material"), &diff, &diff));
+    let object = bench.json("diff", &["0..1"])["changes"][0]["after"].clone();
+    assert_eq!(object["kind"], "object");
+    let before = crate::change_sets::set(
+        Some(2),
+        &[json!({"op": "remove", "fid": document["changes"][0]["fid"], "before": diff})],
+    );
+    bench.run("apply", &[&bench.file("set.jsonl", before)]).ok();
+    assert_eq!(bench.head(), 3);
+}
+
+#[test]
+fn a_region_is_the_same_for_every_command() {
+    let (bench, document) = Bench::with_banner();
+    let (fid, [e, n, h]) = banner(&document);
+    let here = bench.json("query", &["--class", "banner", "--wgs84"])["features"][0].clone();
+    let (latitude, longitude) = (here["latitude"].as_f64().unwrap(), here["longitude"].as_f64().unwrap());
+    let degrees = comma(&[longitude - 1e-5, latitude - 1e-5, longitude + 1e-5, latitude + 1e-5]);
+    let nowhere = comma(&[longitude + 1e-2, latitude, longitude + 2e-2, latitude + 1e-5]);
+    let versions = |words: &[&str]| bench.json("log", words)["versions"].as_array().unwrap().len();
+    assert_eq!((versions(&["--bbox", &degrees, "--wgs84"]) > 0, versions(&["--bbox", &nowhere, "--wgs84"])), (true, 0));
+    let changes =
+        |words: &[&str]| bench.json("diff", &[&["1..2"], words].concat())["changes"].as_array().unwrap().len();
+    assert_eq!((changes(&["--bbox", &degrees, "--wgs84"]), changes(&["--bbox", &nowhere, "--wgs84"])), (1, 0));
+    // Heights alone are a region everywhere in plan.
+    let (around, above) = (comma(&[h - 0.1, h + 0.1]), comma(&[h + 500.0, h + 600.0]));
+    assert!(fids(&bench.json("query", &["--height", &around])).contains(&fid));
+    assert!(fids(&bench.json("query", &["--height", &above])).is_empty());
+    assert_eq!(
+        (changes(&["--height", &around]), changes(&["--height", &above]), versions(&["--height", &above])),
+        (1, 0, 0)
+    );
+    // A feature and a region: the versions that changed it there.
+    let (number, near) = (fid.to_string(), comma(&[e - 1.0, n - 1.0, e + 1.0, n + 1.0]));
+    assert_eq!((versions(&[&number, "--bbox", &near]), versions(&[&number, "--bbox", "0,0,1,1"])), (1, 0));
+    let out = bench.path("out.glb");
+    let exported = bench.json("export", &[text(&out), "--bbox", &degrees, "--wgs84"]);
+    assert_eq!(exported["descriptors"], 1);
+    assert_eq!(bench.run("revert", &["2", "--bbox", &nowhere, "--wgs84"]).code, 20);
+    assert_eq!(bench.json("revert", &["2", "--bbox", &degrees, "--wgs84"])["removed"], 1);
+}
+
+#[test]
+fn degrees_are_added_to_metres_and_replace_none() {
+    let (bench, document) = Bench::with_banner();
+    let (fid, _) = banner(&document);
+    let [plain, degrees] = [&[][..], &["--wgs84"]].map(|words: &[&str]| bench.json("query", words));
+    let collection = bench.run("query", &["--format", "geojson"]).ok().json();
+    for (index, feature) in degrees["features"].as_array().unwrap().iter().enumerate() {
+        let mut without = feature.clone();
+        for key in ["latitude", "longitude", "ellipsoidal_height", "wgs84"] {
+            assert!(!without[key].is_null(), "{key} is missing in {feature}");
+            without.as_object_mut().unwrap().remove(key);
+        }
+        assert_eq!(without, plain["features"][index]);
+        assert_eq!(feature["wgs84"], collection["features"][index]["geometry"]);
+    }
+    let csv = bench.run("query", &["--format", "csv", "--wgs84", "--class", "banner"]).ok().out;
+    let height: f64 = csv.lines().nth(1).unwrap().split(',').nth(6).unwrap().parse().unwrap();
+    let own = degrees["features"].as_array().unwrap().iter().find(|one| one["fid"] == fid).unwrap();
+    assert!((own["ellipsoidal_height"].as_f64().unwrap() - height).abs() < 1e-9);
+}
+
+#[test]
+fn what_lies_outside_the_system_has_no_place_in_degrees_and_is_listed() {
+    let bench = crate::change_sets::furnished();
+    bench.apply(&[json!({"op": "add", "after": {"class": "chair", "position": [10.0, 20.0, 0.0]}})]);
+    let warned = |run: crate::bench::Run| {
+        assert!(run.err.contains("warning: 1 features have no position in degrees"), "{}", run.err);
+        run
+    };
+    let collection = warned(bench.run("query", &["--format", "geojson"]).ok()).json();
+    let geometries: Vec<bool> =
+        collection["features"].as_array().unwrap().iter().map(|one| one["geometry"].is_null()).collect();
+    assert_eq!(geometries, [false, false, true]);
+    collection.to_string().parse::<geojson::GeoJson>().unwrap();
+    let answer = warned(bench.run("query", &["--wgs84", "--json"]).ok()).json();
+    assert_eq!((&answer["features"][2]["latitude"], &answer["features"][2]["wgs84"]), (&Value::Null, &Value::Null));
+    let csv = warned(bench.run("query", &["--wgs84", "--format", "csv"]).ok()).out;
+    assert!(csv.lines().nth(3).unwrap().starts_with("3,dynamic,chair,,,,,"), "{csv}");
+    assert_eq!(warned(bench.run("query", &["--wgs84"]).ok()).out.lines().count(), 4);
+    let diff = warned(bench.run("diff", &["1..2", "--format", "geojson"]).ok()).json();
+    assert_eq!(diff["features"][0]["geometry"], Value::Null);
+}
+
+#[test]
+fn a_place_within_a_large_banner_finds_it_as_its_box_does() {
+    let bench = Bench::with_empty_map();
+    let [e, n, h] = crate::change_sets::CHAIR;
+    // 40 m along a wall: centre and corners are far from where is asked.
+    let banner = json!({"class": "banner",
+        "corners": [[e, n, h], [e, n + 40.0, h], [e, n + 40.0, h + 5.0], [e, n, h + 5.0]]});
+    bench.apply(&[json!({"op": "add", "after": banner})]);
+    let ring = |east: f64| {
+        let corner = |x: f64, y: f64| [e + east + x, n + 10.0 + y];
+        json!({"type": "Polygon", "coordinates": [[corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)]]})
+    };
+    let found = |east: f64| {
+        let file = bench.file("region.geojson", ring(east).to_string());
+        fids(&bench.json("query", &["--polygon", &file]))
+    };
+    assert_eq!((found(0.0), found(3.0)), (vec![1], vec![]));
+    // A circle 2.5 m off the wall, at a quarter of its length; 1 m is 9.7e-6° of longitude there.
+    let quarter = json!({"class": "chair", "position": [e + 2.5, n + 10.0, h]});
+    bench.apply(&[json!({"op": "add", "after": quarter})]);
+    let place = bench.json("query", &["--class", "chair", "--wgs84"])["features"][0].clone();
+    let place = comma(&[place["latitude"].as_f64().unwrap(), place["longitude"].as_f64().unwrap()]);
+    let near = |radius: &str| fids(&bench.json("query", &["--near", &place, "--radius", radius, "--class", "banner"]));
+    assert_eq!((near("2.4"), near("2.6")), (vec![], vec![1]));
 }

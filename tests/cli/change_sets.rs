@@ -1,6 +1,7 @@
 //! `apply`: a change set whole, or refused whole.
 
 use crate::bench::{Bench, edited};
+use crate::differences::chair_at;
 use serde_json::{Value, json};
 
 /// A point of the street, 30 m from its origin.
@@ -80,7 +81,8 @@ fn a_before_that_is_not_what_the_map_has_is_exit_21() {
 #[test]
 fn a_base_that_the_map_never_had_is_exit_11() {
     let bench = furnished();
-    refuses(&bench, &set(Some(7), &[json!({"op": "add", "after": chair()})]), 11, &["no version 7", "newest is 1"]);
+    let words = ["set.jsonl: base_version: no version 7; the newest is 1", "null applies to any version"];
+    refuses(&bench, &set(Some(7), &[json!({"op": "add", "after": chair()})]), 11, &words);
 }
 
 #[test]
@@ -92,10 +94,9 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
     let cases: Vec<(String, Vec<&str>)> = vec![
         (String::new(), vec!["line 1", "resurvey.changes/1"]),
         ("a change\n".to_owned(), vec!["line 1"]),
-        (set(Some(1), &[]), vec!["changes nothing"]),
         (set(Some(1), &[]).replace("changes/1", "changes/2"), vec!["resurvey.changes/2"]),
         (set(Some(1), &[]).replace("author", "auther"), vec!["line 1", "unknown field `auther`"]),
-        (twice, vec!["feature 1 has two deltas"]),
+        (twice, vec!["line 3: feature 1 has two deltas, the first in line 2"]),
         (add(json!({"class": "sofa", "position": CHAIR})), vec!["line 2, after", "\"sofa\"", "expected one of stone"]),
         (add(json!({"class": "sky", "position": CHAIR})), vec!["line 2, after", "sky"]),
         (add(serde_json::from_str(&skewed).unwrap()), vec!["line 2, after", "corner 0"]),
@@ -108,7 +109,7 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
         (set(Some(1), &[json!({"op": "add", "fid": 0, "after": chair()})]), vec!["line 2", "fid 0"]),
         (
             set(Some(1), &[json!({"op": "modify", "fid": 1, "before": chair(), "after": chair()})]),
-            vec!["feature 1 changes nothing"],
+            vec!["line 2: feature 1 changes nothing"],
         ),
     ];
     for (text, words) in cases {
@@ -118,4 +119,54 @@ fn a_set_that_is_none_is_exit_10_with_its_line() {
     bench.run("apply", &["/nowhere.jsonl"]).refused(10, &["/nowhere.jsonl"]);
     let binary = bench.file("set.jsonl", [0xff_u8; 64]);
     bench.run("apply", &[&binary]).refused(10, &["set.jsonl"]);
+}
+
+#[test]
+fn the_base_that_is_printed_is_the_base_in_the_log() {
+    let bench = furnished();
+    bench.apply(&[json!({"op": "add", "after": chair_at(100.0)})]);
+    let file = bench.file("late.jsonl", set(Some(1), &[json!({"op": "add", "after": chair_at(200.0)})]));
+    let applied = bench.json("apply", &[&file]);
+    assert_eq!((&applied["base_version"], &applied["version"]), (&json!(1), &json!(3)));
+    assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["base_version"], applied["base_version"]);
+}
+
+#[test]
+fn a_set_without_an_operation_is_exit_20() {
+    let bench = furnished();
+    let same = bench.run("changes", &["1..1"]).ok().out;
+    for text in [set(Some(1), &[]), set(None, &[]), same] {
+        let file = bench.file("set.jsonl", text);
+        bench.run("apply", &[&file]).refused(20, &["set.jsonl: ", "changes nothing", "after the header"]);
+        let run = bench.run("apply", &[&file, "--json"]);
+        let expected = json!({"decision": "nothing", "base_version": 1, "version": null, "added": 0, "modified": 0,
+            "removed": 0});
+        assert_eq!((run.code, run.json()), (20, expected));
+    }
+    assert_eq!(bench.head(), 1);
+}
+
+#[test]
+fn a_set_without_an_author_is_committed_by_resurvey() {
+    let bench = furnished();
+    let text = set(Some(1), &[json!({"op": "add", "after": chair_at(9.0)})]).replace("\"author\":\"survey\",", "");
+    assert!(!text.contains("author"));
+    bench.json("apply", &[&bench.file("set.jsonl", text)]);
+    assert_eq!(bench.json("log", &["-n", "1"])["versions"][0]["author"], "resurvey");
+}
+
+#[test]
+fn a_set_that_another_program_wrote_is_told_in_its_own_words() {
+    let bench = furnished();
+    let add = set(Some(1), &[json!({"op": "add", "after": chair_at(9.0)})]);
+    let marked = format!("\u{feff}{}", add.replace('\n', "\r\n"));
+    bench.run("apply", &[&bench.file("marked.jsonl", marked)]).ok();
+    for (text, word) in
+        [("[]", "line 1: invalid length 0, expected a header"), ("7", "expected a header, {\"format\": …}")]
+    {
+        bench.run("apply", &[&bench.file("set.jsonl", text)]).refused(10, &[word]);
+    }
+    let line = set(Some(1), &[json!([])]);
+    bench.run("apply", &[&bench.file("set.jsonl", line)]).refused(10, &["line 2: ", "expected an operation"]);
+    bench.run("apply", &[&bench.file("set.jsonl", [0xff_u8; 9])]).refused(10, &["set.jsonl: ", "in UTF-8"]);
 }

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, Run, street, text};
 use crate::change_sets::{chair, furnished, set};
-use crate::differences::chair_at;
+use crate::differences::{chair_at, chair_state};
 use serde_json::{Value, json};
 use std::process::{Command, Stdio};
 
@@ -37,7 +37,14 @@ fn of_two_processes_that_change_one_feature_from_one_base_the_second_gets_a_list
     codes.sort_unstable();
     assert_eq!(codes, [0, 21], "{runs:?}");
     let lost = runs.iter().find(|run| run.code == 21).unwrap().json();
-    assert_eq!(lost["conflicts"], json!([{"fid": 1, "changed_in": 2, "is_on_map": true, "is_target": true}]));
+    let [expected, found] = [chair_state(0.0), lost["conflicts"][0]["found"].clone()];
+    assert!([chair_state(1.0), chair_state(2.0)].contains(&found), "{found}");
+    let one =
+        json!({"fid": 1, "changed_in": 2, "is_on_map": true, "is_target": true, "found": found, "expected": expected});
+    assert_eq!(lost["conflicts"], json!([one]));
+    for word in ["feature 1: expected chair at E 835600.00", ", found chair at E 83560"] {
+        assert!(runs.iter().any(|run| run.err.contains(word)), "expected {word:?} in {runs:?}");
+    }
     assert_eq!((&lost["base_version"], &lost["head"]), (&json!(1), &json!(2)));
     assert_eq!(bench.head(), 2);
 }
@@ -129,4 +136,18 @@ fn an_update_that_is_sent_again_with_its_key_gives_its_first_version() {
     assert_eq!((&forgotten["version"], &forgotten["changes"]), (&json!(2), &json!([])));
     let two = [text(&capture), text(&capture), "--idempotency-key", "k"];
     bench.run("update", &two).refused(2, &["--idempotency-key belongs to one photo"]);
+}
+
+#[test]
+fn a_before_that_is_wrong_in_one_value_is_told_by_that_value() {
+    let bench = furnished();
+    let mut unsure = chair();
+    unsure["sigma_m"] = json!(0.25);
+    let file = bench.file("set.jsonl", set(Some(1), &[json!({"op": "remove", "fid": 1, "before": unsure})]));
+    bench.run("apply", &[&file]).refused(21, &["feature 1: expected sigma_m = 0.25, found sigma_m = none"]);
+    let gone = bench.file("set.jsonl", set(Some(1), &[json!({"op": "remove", "fid": 9, "before": chair()})]));
+    bench.run("apply", &[&gone]).refused(21, &["feature 9: expected chair at E 835600.00", "found none"]);
+    let run = bench.run("apply", &[&gone, "--json"]);
+    let one = &run.json()["conflicts"][0];
+    assert_eq!((&one["expected"], &one["found"], &one["changed_in"]), (&chair_state(0.0), &Value::Null, &Value::Null));
 }

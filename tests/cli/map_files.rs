@@ -1,8 +1,12 @@
 //! Map files that are no maps, newer, damaged, read-only or in use: exit codes 11, 13 and 21.
 
 use crate::bench::{Bench, noise, resurvey, street, text};
+use jiff::Timestamp;
+use resurvey_core::store::{History, MapFile};
+use resurvey_core::version::VersionId;
 use rusqlite::Connection;
 use std::fs;
+use std::process::Command;
 
 /// Command lines that open a map, by their words after it; the last three write.
 fn commands(bench: &Bench) -> Vec<Vec<String>> {
@@ -145,10 +149,61 @@ fn a_map_that_another_writes_is_exit_21_after_a_wait() {
          {\"op\":\"add\",\"after\":{\"class\":\"chair\",\"position\":[835600,817800,4.5]}}\n",
     );
     bench.refuses("apply", &[&changes], 21, &["another process is writing", "try again"]);
+    let busy = bench.run("apply", &[&changes, "--json"]);
+    assert_eq!((busy.code, busy.json()), (21, serde_json::json!({"decision": "busy", "version": null})));
     // Readers are not held up.
     assert_eq!(bench.json("query", &[])["version"], 1);
     writer.execute_batch("ROLLBACK").unwrap();
     drop(writer);
     bench.run("apply", &[&changes]).ok();
     assert_eq!(bench.head(), 2);
+}
+
+#[test]
+fn a_map_that_one_process_has_open_twice_loses_nothing_to_another_process() {
+    // POSIX takes all locks of a process from a file as soon as it closes one descriptor of it
+    // (https://sqlite.org/howtocorrupt.html, 2.2). A process that ends then finds the map unused, and removes the log that
+    // this one writes to.
+    let bench = Bench::with_empty_map();
+    let path = bench.path("map.rsv");
+    let tag_elsewhere = |name: &str| {
+        let run = Command::new(env!("CARGO_BIN_EXE_resurvey")).arg("tag").arg(&path).arg(name).output().unwrap();
+        assert!(run.status.success());
+    };
+    let first = MapFile::open(&path).unwrap();
+    drop(MapFile::open(&path).unwrap());
+    drop(MapFile::open_read_only(&path).unwrap());
+    tag_elsewhere("before");
+    first.tag("during", VersionId(0), Timestamp::UNIX_EPOCH).unwrap();
+    tag_elsewhere("after");
+    drop(first);
+    let tags = bench.json("tag", &[]);
+    let names: Vec<&str> = tags["tags"].as_array().unwrap().iter().map(|tag| tag["tag"].as_str().unwrap()).collect();
+    assert_eq!(names, ["after", "before", "during"]);
+}
+
+#[test]
+fn a_file_too_damaged_to_open_is_told_by_fsck_as_any_damage() {
+    let bench = Bench::with_street();
+    let whole = fs::read(bench.path("map.rsv")).unwrap();
+    let mut headless = whole.clone();
+    headless[..100].fill(0);
+    let files = [
+        ("cut.rsv", &whole[..whole.len() / 2 + 100], "it ends after"),
+        ("headless.rsv", &headless, "another kind of file"),
+        ("empty.rsv", &[], "an empty file"),
+    ];
+    for (name, bytes, word) in files {
+        let file = bench.file(name, bytes);
+        for words in [&["fsck", file.as_str(), "--json"][..], &["fsck", &file, "--json", "--repair"]] {
+            let run = resurvey(words);
+            assert_eq!(run.code, 13, "{}", run.err);
+            let document = run.json();
+            let problem = document["problems"][0].as_str().unwrap();
+            assert!(document["ok"] == false && problem.starts_with("file: ") && problem.contains(word), "{document}");
+            assert!(!run.err.contains("resurvey fsck"), "fsck sends to itself: {}", run.err);
+        }
+    }
+    let missing = resurvey(&["fsck", text(&bench.path("none.rsv")), "--json"]);
+    missing.refused(11, &["no such map"]);
 }

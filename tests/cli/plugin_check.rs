@@ -210,8 +210,11 @@ fn every_shipped_plugin_passes() {
     for library in [
         "resurvey_class_difference",
         "resurvey_descriptors",
+        "resurvey_edges",
         "resurvey_palette",
+        "resurvey_pixel",
         "resurvey_semantic",
+        "resurvey_silhouette",
         "resurvey_skyline",
     ] {
         let (code, document) = check(&built(library), "60");
@@ -234,6 +237,77 @@ fn plugins_in_c_and_rust_without_a_fault_pass() {
         let (code, document) = check(&library, "30");
         assert_eq!(code, 0, "{source:?}: {document:#}");
     }
+}
+
+#[test]
+fn a_matcher_in_c_plus_plus_with_the_standard_library_passes() {
+    let directory = tempfile::tempdir().unwrap();
+    let library = directory.path().join("libcpp.so");
+    let built = Command::new("c++")
+        .args(["-std=c++17", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-I"])
+        .arg(format!("{ROOT}/schema/include"))
+        .arg(format!("{ROOT}/plugins/fixtures/cpp/matcher.cpp"))
+        .args(["-o", text(&library)])
+        .output();
+    let Ok(built) = built else {
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no C++ compiler c++; a matcher in C++ was not checked");
+        return;
+    };
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let (code, document) = check(&library, "30");
+    assert_eq!((code, &test(&document, "exports")["result"]), (0, &Value::from("ok")), "{document:#}");
+}
+
+/// Scores with the photo of the first call, which it keeps: a view of memory that is lent.
+const KEEPER: &str = r##"#!/usr/bin/env python3
+# resurvey-plugin: {"wire": 1, "kind": "matcher", "name": "keeper", "version": "1", "summary": "Keeps what it was lent"}
+import json, mmap, os, socket, struct
+wire = socket.socket(fileno=os.dup(1)); os.dup2(2, 1)
+lines, memory, kept = wire.makefile("r"), mmap.mmap(os.dup(0), 0), None
+say = lambda message: wire.sendall((json.dumps(message) + "\n").encode())
+say({"hello": {"wire": 1, "name": "keeper", "version": "1", "kind": "matcher", "summary": "Keeps what it was lent",
+               "form": "score", "settings_schema": ""}})
+for line in lines:
+    (name, body), = json.loads(line).items()
+    if name == "create": kept = None
+    if name == "score":
+        if body["memory"] > len(memory): memory = mmap.mmap(0, body["memory"])
+        photo, labels = body["photo"], body["views"]["labels"]
+        size = photo["shape"][0] * photo["shape"][1]
+        kept = kept or memoryview(memory)[photo["offset"]:photo["offset"] + size]
+        for view in range(labels["shape"][0]):
+            at = labels["offset"] + view * labels["strides"][0]
+            same = sum(x == y for x, y in zip(kept, memory[at:at + size]))
+            struct.pack_into("<d", memory, body["scores"]["offset"] + 8 * view, same / size)
+    say({"done": {}})
+"##;
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_executable_that_keeps_what_it_was_lent_is_found_out() {
+    use std::os::unix::fs::PermissionsExt;
+    if Command::new("python3").arg("--version").output().is_err() {
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no python3; an executable was not checked");
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("resurvey-plugin-keeper");
+    std::fs::write(&file, KEEPER).unwrap();
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let (code, document) = check(&file, "30");
+    let repeats = test(&document, "repeats");
+    assert_eq!((code, &repeats["result"]), (12, &Value::from("failed")), "{document:#}");
+    let words = format!("{} · {}", repeats["problem"], repeats["advice"]);
+    assert!(words.contains("another answer to the same input") && words.contains("copy what you keep"), "{words}");
+
+    std::fs::write(
+        &file,
+        KEEPER.replace("for line in lines:", "raise ModuleNotFoundError('numpy')\nfor line in lines:"),
+    )
+    .unwrap();
+    let (_, document) = check(&file, "30");
+    let words = test(&document, "settings")["advice"].as_str().unwrap().to_owned();
+    assert!(words.contains("docs/plugin-wire.md") && words.contains("last words"), "{document:#}");
 }
 
 #[test]

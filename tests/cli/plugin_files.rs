@@ -97,6 +97,8 @@ fn a_plugin_that_fails_or_lies_stops_the_update() {
     for (flag, words) in [
         ("-DENTRY_FAILS", &["needs a licence"][..]),
         ("-DCREATE_FAILS", &["plugin broken", "no model for this city"]),
+        // It leaves what it has freed where the instance would be.
+        ("-DCREATE_LEAVES", &["plugin broken gave no answer in create: no model for this city"]),
         ("-DSCORE=NAN", &["plugin broken", "NaN", "from 0 to 1"]),
         ("-DNO_REASON", &["plugin broken", "no reason given"]),
     ] {
@@ -184,4 +186,24 @@ fn an_allowed_plugin_localizes_and_is_named_in_the_result() {
     let run = bench.run("localize", &arguments);
     assert!([0, 22].contains(&run.code), "{}", run.err);
     assert_eq!(run.json()["matcher"], json!({"name": "agreement", "version": "1.0.0", "sha256": sha256}));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_plugin_said_before_it_failed_is_printed() {
+    for command in ["localize", "update"] {
+        let bench = Bench::with_street();
+        let Some(sha256) = plugin(&bench, "faults.c", "faults", &["-DSEARCH"]) else { return };
+        let (capture, directory) = (street().path("capture/capture.json"), bench.path("plugins"));
+        let output = Command::new(env!("CARGO_BIN_EXE_resurvey"))
+            .args([command, text(&bench.path("map.rsv")), text(&capture), "--matcher", "faults"])
+            .args(["--set", "faults.how=exit", "--plugin-dir", text(&directory), "--allow-plugin", &sha256])
+            .env("XDG_DATA_HOME", bench.path("data"))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(12), "{said}");
+        let (told, failed) = (said.find("searching\n"), said.find("resurvey: "));
+        assert!(told.is_some() && told < failed, "{said}");
+    }
 }

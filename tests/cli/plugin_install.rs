@@ -145,7 +145,11 @@ fn a_new_build_takes_the_place_of_the_old_one() {
     std::fs::write(user.data().join("allowed-plugins"), format!("{other} of my own\n")).unwrap();
     user.json(&["install", text(&old), "--no-check"]);
     assert_eq!(user.json(&["install", text(&new), "--no-check"])["replaced"], json!([first]));
-    assert_eq!((user.kept(), user.allowed()), (vec![second.clone()], vec![other.clone(), second]));
+    // The older build stays for replay, and the new one is the last on the list: it runs.
+    let mut both = vec![first.clone(), second.clone()];
+    both.sort();
+    assert_eq!((user.kept(), user.allowed()), (both, vec![other.clone(), first, second.clone()]));
+    assert_eq!(user.json(&["info", "agreement"])["sha256"], json!(second));
     // What the user wrote stays as it was.
     let list = std::fs::read_to_string(user.data().join("allowed-plugins")).unwrap();
     assert!(list.starts_with(&format!("{other} of my own\n")), "{list}");
@@ -208,4 +212,61 @@ fn a_library_that_changes_after_it_was_installed_is_not_loaded() {
     user.refused(&["info", "agreement"], 12, &["refused libagreement.so at allow-list"]);
     let skipped = user.json(&["list"])["skipped"].clone();
     assert!(skipped[0]["reason"].as_str().unwrap().contains("allow-list"), "{skipped}");
+}
+
+#[test]
+fn builds_that_are_installed_at_once_are_all_on_the_list() {
+    let user = User::new();
+    let named = |number| format!("-DNAME=\"mine{number}\"");
+    let built = (0..6).map(|number| user.library("broken.c", &format!("mine{number}"), &[&named(number)]));
+    let Some(libraries) = built.collect::<Option<Vec<_>>>() else { return };
+    std::thread::scope(|scope| {
+        for (library, _) in &libraries {
+            scope.spawn(|| user.json(&["install", text(library), "--no-check"]));
+        }
+    });
+    let mut expected: Vec<String> = libraries.into_iter().map(|(_, sha256)| sha256).collect();
+    expected.sort();
+    let mut allowed = user.allowed();
+    allowed.sort();
+    assert_eq!(allowed, expected);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_list_that_others_may_write_or_nobody_can_read_allows_nothing() {
+    let user = User::new();
+    let Some((library, _)) = user.library("matcher.c", "mine", &[]) else { return };
+    user.json(&["install", text(&library), "--no-check"]);
+    let list = user.data().join("allowed-plugins");
+    allow_writing(&list, 0o646);
+    let words = ["allowed-plugins", "every user of this machine may write the file", "chmod o-w"];
+    user.refused(&["info", "agreement"], 12, &words);
+    std::fs::write(&list, b"\xff\xfe").unwrap();
+    allow_writing(&list, 0o600);
+    user.refused(&["info", "agreement"], 10, &["allowed-plugins", "UTF-8"]);
+}
+
+#[test]
+fn a_data_directory_that_is_no_whole_path_counts_for_nothing() {
+    let user = User::new();
+    let listed = Command::new(env!("CARGO_BIN_EXE_resurvey"))
+        .args(["plugins", "list", "--json"])
+        .env("XDG_DATA_HOME", "data")
+        .env("HOME", user.0.path())
+        .current_dir(user.0.path())
+        .output()
+        .unwrap();
+    assert!(listed.status.success());
+    let Some((library, _)) = user.library("matcher.c", "mine", &[]) else { return };
+    let installed = Command::new(env!("CARGO_BIN_EXE_resurvey"))
+        .args(["plugins", "install", "--no-check", text(&library)])
+        .env("XDG_DATA_HOME", "data")
+        .env("HOME", user.0.path())
+        .current_dir(user.0.path())
+        .output()
+        .unwrap();
+    assert!(installed.status.success(), "{}", String::from_utf8_lossy(&installed.stderr));
+    assert!(!user.0.path().join("data").exists());
+    assert!(user.0.path().join(".local/share/resurvey/allowed-plugins").exists());
 }

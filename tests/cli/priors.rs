@@ -233,6 +233,15 @@ fn a_source_that_says_nothing_is_refused_with_what_it_lacks() {
     bench.refuses("localize", &[&untimed, "--nmea", &walk], 10, &["taken_at is missing", "--at-time"]);
     let found = prior(&bench, &untimed, &["--nmea", &walk, "--at-time", TAKEN_AT]);
     assert_eq!(found["source"], json!("nmea"));
+    // A date is the end of that day, with @ or without: nothing in this log is near it.
+    for date in ["2026-06-01", "@2026-06-01"] {
+        bench.refuses(
+            "localize",
+            &[&untimed, "--nmea", &walk, "--at-time", date],
+            10,
+            &["walk.nmea", "2026-06-01T23:59:59"],
+        );
+    }
 }
 
 #[test]

@@ -26,9 +26,14 @@ fn the_log_of_a_build_has_its_versions_alone() {
     for build in [sha256.as_str(), &sha256[..8], "class-difference", "class-difference@0.1.0"] {
         assert_eq!(versions(&bench.json("log", &["--by-plugin", build])), [2], "{build}");
     }
+    // What this map has never seen is not there, and what it has seen is listed.
+    let recorded = format!("recorded are class-difference@0.1.0 ({}), descriptors@0.1.0 (", &sha256[..8]);
     for build in ["skyline", "class-difference@9", &"0".repeat(64)] {
-        assert!(versions(&bench.json("log", &["--by-plugin", build])).is_empty(), "{build}");
+        for command in ["log", "revert"] {
+            bench.run(command, &["--by-plugin", build]).refused(11, &[&format!("no plugin {build} in"), &recorded]);
+        }
     }
+    Bench::with_empty_map().run("log", &["--by-plugin", "skyline"]).refused(11, &["recorded are no plugin at all"]);
     bench.run("log", &["--by-plugin", "@1"]).refused(2, &["NAME@VERSION"]);
 }
 

@@ -140,3 +140,30 @@ fn reports_that_cannot_be_written_are_refused_before_the_map_changes() {
     let (capture, pose) = (capture(&bench, "0042"), street().path("pose.json"));
     bench.refuses("update", &[text(&capture), "--pose", text(&pose), "--report", &file], 10, &["reports"]);
 }
+
+#[test]
+fn a_page_that_cannot_be_written_hides_no_version() {
+    let bench = Bench::with_street();
+    let capture = capture(&bench, "0042");
+    std::fs::create_dir_all(bench.path("reports/0042.html")).unwrap();
+    let run = update(&bench, &capture, &street().path("pose.json"), &[]);
+    assert_eq!(run.code, 10, "{}", run.err);
+    assert!(run.err.contains("0042.html: ") && !run.err.contains("standard output"), "{}", run.err);
+    assert_eq!((&run.json()["decision"], &run.json()["version"]), (&json!("committed"), &json!(2)));
+    assert_eq!(bench.head(), 2);
+    // What was not done for another reason keeps its code.
+    let again = update(&bench, &capture, &street().path("pose.json"), &[]);
+    assert_eq!((again.code, &again.json()["decision"]), (20, &json!("nothing")));
+    assert!(again.err.contains("0042.html: "), "{}", again.err);
+}
+
+#[test]
+fn a_page_of_somebody_else_is_not_written_over() {
+    let bench = Bench::with_street();
+    std::fs::create_dir_all(bench.path("reports")).unwrap();
+    std::fs::write(bench.path("reports/index.html"), "<title>my site</title>").unwrap();
+    let run = update(&bench, &capture(&bench, "0042"), &street().path("pose.json"), &[]);
+    run.refused(10, &["index.html: ", "a page of somebody else"]);
+    assert_eq!(read(&bench, "index.html"), "<title>my site</title>");
+    assert!(bench.is_unchanged());
+}

@@ -1,13 +1,19 @@
 //! `update --propose` and `--confirm`, and `proposals`.
 
 use crate::bench::{Bench, edited, street, text};
+use crate::synthetic::label_png;
 use serde_json::{Value, json};
 
-/// The street's capture with other bytes, as another phone would send it; the labels are the same.
-fn another(bench: &Bench, name: &str, taken_at: &str) -> String {
+/// The street's capture as another phone would send it: another time, and the first `pixels` pixels void.
+fn another(bench: &Bench, name: &str, (taken_at, pixels): (&str, usize)) -> String {
     let directory = bench.path(name);
     std::fs::create_dir_all(&directory).unwrap();
-    std::fs::copy(street().path("capture/labels.png"), directory.join("labels.png")).unwrap();
+    let file = std::fs::File::open(street().path("capture/labels.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+    let mut indices = vec![0; reader.output_buffer_size().unwrap()];
+    let width = reader.next_frame(&mut indices).unwrap().width;
+    indices[..pixels].fill(255);
+    std::fs::write(directory.join("labels.png"), label_png::encode(&indices, width as usize).unwrap()).unwrap();
     let capture: Value =
         serde_json::from_slice(&std::fs::read(street().path("capture/capture.json")).unwrap()).unwrap();
     let path = directory.join("capture.json");
@@ -78,15 +84,23 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
     update(&bench, &capture(), &["--propose"]);
     assert_eq!(bench.run("proposals", &["reject", "1", "--note", "a shadow"]).ok().out, "proposal 1 is rejected\n");
     for action in ["accept", "reject"] {
-        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already"]);
-        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9"]);
+        bench.run("proposals", &[action, "1"]).refused(21, &["proposal 1 is rejected already", "MAP show 1"]);
+        bench.run("proposals", &[action, "9"]).refused(11, &["no proposal 9", "list --all"]);
         bench.run("proposals", &[action]).refused(2, &["the number of a proposal"]);
     }
     bench.run("proposals", &["show", "9"]).refused(11, &["no proposal 9"]);
     bench.run("proposals", &["weigh", "1"]).refused(2, &["[possible values: list, show, accept, reject]"]);
     assert!(bench.run("proposals", &["show", "1"]).ok().out.contains("a shadow"));
-    // Sent again it is not a new one.
-    assert_eq!(update(&bench, &capture(), &["--propose"])["proposals"], json!([1]));
+    // Sent again it is not a new one, and nothing waits.
+    let pose = street().path("pose.json");
+    for words in [&["--propose"][..], &["--confirm", "2"]] {
+        let again = bench.run("update", &[&[&capture(), "--pose", text(&pose), "--json"], words].concat());
+        let document = again.json();
+        assert_eq!((again.code, &document["decision"], &document["proposals"]), (20, &json!("nothing"), &json!([1])));
+        assert_eq!(document["decided"], json!([{"id": 1, "status": "rejected"}]));
+    }
+    let told = bench.run("update", &[&capture(), "--pose", text(&pose), "--propose"]);
+    assert!(told.out.contains("proposal  1, rejected before"), "{}", told.out);
     assert_eq!(bench.json("proposals", &[])["proposals"], json!([]));
     assert_eq!(bench.head(), 1);
 }
@@ -95,10 +109,19 @@ fn a_rejected_proposal_makes_no_version_and_is_decided_once() {
 fn what_is_on_the_map_by_now_is_not_accepted_again() {
     let bench = Bench::with_street();
     update(&bench, &capture(), &["--propose"]);
-    let other = another(&bench, "other", "2026-06-01T11:00:00+08:00");
+    let other = another(&bench, "other", ("2026-06-01T11:00:00+08:00", 1));
     assert_eq!(update(&bench, &other, &["--propose"])["proposals"], json!([2]));
     bench.json("proposals", &["accept", "2"]);
     bench.run("proposals", &["accept", "1"]).refused(21, &["is where proposal 1 puts its own", "proposals show 1"]);
+    let taken = bench.run("proposals", &["accept", "1", "--json"]);
+    let fid = bench.json("query", &["--class", "banner"])["features"][0]["fid"].clone();
+    let there = json!([{"fid": fid, "changed_in": 2, "is_on_map": true, "is_target": false}]);
+    let expected = json!({"decision": "conflict", "base_version": 1, "head": 2, "version": null, "conflicts": there,
+        "looked_at_by": [], "id": 1, "status": "open"});
+    assert_eq!((taken.code, taken.json()), (21, expected));
+    let decided = bench.run("proposals", &["reject", "2", "--json"]);
+    let expected = json!({"decision": "conflict", "id": 2, "status": "accepted", "version": null});
+    assert_eq!((decided.code, decided.json()), (21, expected));
     assert_eq!(bench.json("query", &["--class", "banner"])["features"].as_array().map(Vec::len), Some(1));
     assert_eq!((bench.head(), bench.json("proposals", &[])["proposals"][0]["id"].clone()), (2, json!(1)));
 }
@@ -112,13 +135,17 @@ fn a_change_becomes_a_version_when_enough_captures_agree() {
     // The same capture counts once, however often it is sent.
     assert_eq!(confirm(&capture())["decision"], "proposed");
     assert_eq!(confirm(&capture())["proposals"], json!([1]));
-    let second = confirm(&another(&bench, "second", "2026-06-01T11:00:00+08:00"));
-    assert_eq!((&second["decision"], &second["proposals"]), (&json!("proposed"), &json!([2])));
+    // Nor does its photo under another time, or in another file.
+    let copy = confirm(&another(&bench, "copy", ("2026-06-01T10:30:00+08:00", 0)));
+    assert_eq!((&copy["decision"], &copy["proposals"]), (&json!("proposed"), &json!([2])));
+    let second = confirm(&another(&bench, "second", ("2026-06-01T11:00:00+08:00", 1)));
+    assert_eq!((&second["decision"], &second["proposals"]), (&json!("proposed"), &json!([3])));
     assert_eq!(bench.head(), 1);
-    let third = confirm(&another(&bench, "third", "2026-06-01T12:00:00+08:00"));
+    let third = confirm(&another(&bench, "third", ("2026-06-01T12:00:00+08:00", 2)));
     assert_eq!((&third["decision"], &third["version"]), (&json!("committed"), &json!(2)));
     let banner = bench.json("query", &["--class", "banner"])["features"][0].clone();
     assert_eq!(banner["fid"], third["changes"][0]["fid"]);
+    assert_eq!(third["changes"], bench.json("diff", &["1..2"])["changes"]);
     // The same place three times: as it was, and √3 surer.
     let one = &first["changes"][0]["after"];
     let sigma = |state: &Value| state["sigma_m"].as_f64().unwrap();

@@ -1,8 +1,8 @@
 //! `revert` and `tag`.
 
 use crate::bench::Bench;
-use crate::change_sets::CHAIR;
-use crate::differences::{chair_at, changed};
+use crate::change_sets::{CHAIR, chair, furnished};
+use crate::differences::{chair_at, chair_state, changed};
 use serde_json::{Value, json};
 
 #[test]
@@ -33,7 +33,10 @@ fn an_undo_of_what_changed_later_is_exit_21_with_a_list() {
     let document = run.json();
     let keys: Vec<&String> = document.as_object().unwrap().keys().collect();
     assert_eq!(keys, ["decision", "base_version", "head", "version", "conflicts", "looked_at_by"]);
-    assert_eq!(document["conflicts"], json!([{"fid": 1, "changed_in": 3, "is_on_map": true, "is_target": true}]));
+    let (found, expected) = (chair_state(2.0), chair_state(1.0));
+    let one =
+        json!({"fid": 1, "changed_in": 3, "is_on_map": true, "is_target": true, "found": found, "expected": expected});
+    assert_eq!(document["conflicts"], json!([one]));
     assert_eq!((&document["decision"], &document["version"]), (&json!("conflict"), &Value::Null));
     assert_eq!(bench.head(), 3);
     // Where nothing changed since, it can be undone.
@@ -44,10 +47,32 @@ fn an_undo_of_what_changed_later_is_exit_21_with_a_list() {
 }
 
 #[test]
+fn an_undo_does_not_put_a_chair_into_the_one_that_stands_there_by_now() {
+    let bench = furnished();
+    bench.apply(&[json!({"op": "remove", "fid": 1, "before": chair()})]);
+    bench.apply(&[json!({"op": "add", "after": chair_at(0.1)})]);
+    let run = bench.run("revert", &["2", "--json"]);
+    assert_eq!(run.code, 21, "{run:?}");
+    let there = json!({"fid": 3, "changed_in": 3, "is_on_map": true, "is_target": false, "found": chair_state(0.1)});
+    assert_eq!(run.json()["conflicts"], json!([there]));
+    assert_eq!(bench.head(), 3);
+    // Once that is gone, there is room.
+    bench.json("revert", &["3"]);
+    assert_eq!(bench.json("revert", &["2"])["added"], 1);
+}
+
+#[test]
 fn an_undo_that_has_nothing_to_undo_is_exit_20() {
     let bench = changed();
     bench.run("revert", &["2", "--bbox", "0,0,1,1"]).refused(20, &["version 2 changed nothing in the region"]);
     bench.run("revert", &["0"]).refused(20, &["version 0 changed nothing"]);
+    for words in [&["2", "--bbox", "0,0,1,1", "--json"][..], &["0", "--json"]] {
+        let run = bench.run("revert", words);
+        let reverts: u64 = words[0].parse().unwrap();
+        let expected = json!({"decision": "nothing", "reverts": reverts, "version": null, "added": 0, "modified": 0,
+            "removed": 0});
+        assert_eq!((run.code, run.json()), (20, expected));
+    }
     bench.run("revert", &["7"]).refused(11, &["no version 7; the newest is 2"]);
     bench.run("revert", &["@1999-12-31"]).refused(11, &["no version at 1999-12-31"]);
     assert_eq!(bench.head(), 2);

@@ -1,6 +1,7 @@
-//! The toy worlds of the Rust SDK and of the Python package are one world, written twice: they judge each other.
+//! The toy worlds of the Rust SDK, of the Python package and of the C header are one world, written three times: they judge
+//! each other.
 
-use crate::trial::{Trial, has};
+use crate::trial::{ROOT, Trial, has};
 use resurvey_plugin::Host as _;
 use resurvey_plugin::schema::{ClassId, Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Pose};
 use resurvey_plugin::toy::{Paint, ToyCamera, ToyHost, ToyScene};
@@ -62,6 +63,43 @@ fn the_toy_worlds_of_rust_and_python_show_the_same() {
             "{found} m, {expected} m"
         );
     }
+}
+
+/// The street of the C header and of the Python package: labels, from two places.
+const STREET_IN_C: &str = r#"
+#include "resurvey_toy.h"
+int main(void) {
+  rsv_toy street;
+  rsv_toy_street(&street, 97, 61);
+  rsv_pose turned = {{835001.5, 816999.0, 5.9}, 0.3, 0.05, -0.04};
+  for (int i = 0; i < 2; i++) {
+    rsv_view seen = rsv_toy_see(&street, i ? &turned : &rsv_toy_pose, 1, 1);
+    for (size_t k = 0; k < 97 * 61; k++) printf("%02x", ((const uint8_t *)seen.labels.data)[k]);
+    putchar('\n');
+    rsv_toy_forget(&seen);
+  }
+  return 0;
+}
+"#;
+const STREET_IN_PYTHON: &str = "
+from resurvey_plugin import Pose, toy
+for pose in (toy.POSE, Pose(835001.5, 816999.0, 5.9, 0.3, 0.05, -0.04)):
+    print(toy.street(97, 61).view(pose).labels.tobytes().hex())
+";
+
+#[test]
+fn the_toy_streets_of_c_and_python_show_the_same() {
+    if !has(&["cc", "python3", "numpy"]) {
+        return;
+    }
+    let trial = Trial::bare().with_python_package();
+    trial.shell("true");
+    std::fs::write(trial.path("street.c"), STREET_IN_C).unwrap();
+    let include = format!("-I '{ROOT}/plugins/toy' -I '{ROOT}/schema/include'");
+    let in_c = trial.shell(&format!("cc -std=c11 -Wall -Wextra -Werror {include} street.c -o street -lm && ./street"));
+    assert_eq!(in_c, trial.shell(&format!("python3 -c '{STREET_IN_PYTHON}'")));
+    let seen: std::collections::BTreeSet<u8> = in_c.lines().flat_map(bytes).collect();
+    assert_eq!(seen, [0, 1, 2, 6, 8].into(), "the views show all of it");
 }
 
 fn bytes(hex: &str) -> Vec<u8> {

@@ -37,6 +37,12 @@ pub fn readme_block(heading: &str, index: usize) -> String {
     section.split("```sh\n").nth(index + 1).unwrap().split("```").next().unwrap().to_owned()
 }
 
+/// How the first comment of a C or C++ example says that it is built.
+pub fn build_line(source: &str) -> String {
+    let text = std::fs::read_to_string(Path::new(ROOT).join(source)).unwrap();
+    text.lines().find_map(|line| line.split_once("Build: ")).expect("a build line").1.to_owned()
+}
+
 /// The folder `plugin-trial` of the README.
 fn street() -> &'static TempDir {
     static STREET: OnceLock<TempDir> = OnceLock::new();
@@ -118,10 +124,10 @@ impl Trial {
         (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
     }
 
-    /// Types what the section of the README says, and looks at the pose that its last line gives.
-    pub fn follow(&self, heading: &str, name: &str) {
-        self.shell(&readme_block(heading, 0));
-        self.finds_the_pose(name);
+    /// Types what a block of the section of the README says, and looks at the pose that its last line gives.
+    pub fn follow(&self, heading: &str, block: usize, name: &str) {
+        self.shell(&readme_block(heading, block));
+        self.finds_the_pose(&["--matcher", name]);
     }
 
     /// Checks and installs a plugin.
@@ -131,8 +137,7 @@ impl Trial {
 
     /// Builds a C or C++ example by the line in its first comment.
     pub fn built_by_its_first_comment(&self, source: &str, library: &str) -> PathBuf {
-        let text = std::fs::read_to_string(Path::new(ROOT).join(source)).unwrap();
-        let line = text.lines().find_map(|line| line.split_once("Build: ")).expect("a build line").1;
+        let line = build_line(source);
         let built = self.path(library);
         assert!(line.ends_with(&format!(" -o {library}")), "{line}");
         let elsewhere = line.replace(&format!(" -o {library}"), &format!(" -Werror -o '{}'", built.display()));
@@ -140,13 +145,14 @@ impl Trial {
         built
     }
 
-    /// Asserts that the matcher `name` finds the true pose of the capture.
-    pub fn finds_the_pose(&self, name: &str) {
-        let json = self.json(&format!("resurvey localize city.rsv capture.json --matcher {name} --json"));
+    /// Asserts that `localize` with `options` finds the true pose of the capture.
+    pub fn finds_the_pose(&self, options: &[&str]) {
+        let options = options.join(" ");
+        let json = self.json(&format!("resurvey localize city.rsv capture.json {options} --json"));
         let truth = &self.truth()["pose"];
         let off = |key: &str| json["pose"][key].as_f64().unwrap() - truth[key].as_f64().unwrap();
         let (metres, degrees) = (off("easting").hypot(off("northing")), off("yaw_deg").abs());
-        assert!(metres < 1.0 && degrees < 1.5, "{name} is {metres:.2} m and {degrees:.2}° off: {json}");
+        assert!(metres < 1.0 && degrees < 1.5, "{options}: {metres:.2} m and {degrees:.2}° off: {json}");
     }
 
     /// Asserts that an update with the plugin `name` adds the banner that the capture shows.

@@ -9,9 +9,9 @@ use super::parallel::in_order;
 use super::progress::{Portion, Progress};
 use super::{csv, document, table_v, text};
 use crate::args::{Eval, Experiment, PluginSearch};
-use crate::commands::write_file;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::out_file::{check_file, write_file};
 use resurvey_core::evaluate::Bootstrap;
 
 /// What a run came to, for tables and documents.
@@ -49,7 +49,7 @@ pub fn run(options: &Eval, plugins: &PluginSearch, console: &mut Console<'_>) ->
         }
     }
     if let Some(path) = &options.csv {
-        write_file(path, b"")?;
+        check_file(path)?;
     }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let jobs = match options.jobs {

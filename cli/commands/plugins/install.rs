@@ -18,7 +18,7 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let bytes = std::fs::read(file).map_err(|error| failure(file, &error))?;
     // Its own permissions and header first: their messages name the file that the user knows.
     Registry::vet(file)?;
-    let info = Registry::inspect(file)?;
+    let (info, is_executable) = Registry::inspect_bytes(file, &bytes)?;
     if let Some(builtin) = registry.list().iter().find(|other| other.builtin && other.name == info.name) {
         let name = &builtin.name;
         return Err(refused(&format!(
@@ -29,7 +29,6 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     let installed = Installed::of_this_user()?;
     let sha256 = Digest::of(&bytes);
     let home = installed.plugins().join(sha256.to_string());
-    let is_executable = Registry::is_executable(file);
     let name = if is_executable { format!("{EXECUTABLE_PREFIX}{}", info.name) } else { library_name(&info.name) };
     let copy = Copy::new(&installed.plugins(), &name, &bytes, is_executable)?;
     let checked = if options.no_check { None } else { Some(check(&copy.file, options.limits, console)?) };
@@ -38,10 +37,10 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
     }
     let was_there = home.is_dir();
     copy.keep(&home)?;
-    let is_new = installed.allow(sha256, &format!("{} {}", info.name, info.version))? || !was_there;
-    let replaced = replace(&installed, &info.name, sha256)?;
+    let is_new = installed.allow(sha256, &info.name, &info.version)? || !was_there;
+    let older = others(&installed, &info.name, sha256);
     let info = PluginInfo { path: Some(home.join(name)), sha256, ..info };
-    say(&info, is_new, &replaced, checked.as_ref(), console)?;
+    say(&info, is_new, &older, checked.as_ref(), console)?;
     Ok(0)
 }
 
@@ -62,22 +61,17 @@ fn not_installed(file: &Path, checked: &Checked, console: &mut Console<'_>) -> R
     )))
 }
 
-/// Takes other builds of the same name away: of two, the one that counts would be a matter of chance.
-fn replace(installed: &Installed, name: &str, kept: Digest) -> Result<Vec<Library>, Failure> {
+/// Other builds of the same name, which do not run any more and stay for `replay`.
+fn others(installed: &Installed, name: &str, newest: Digest) -> Vec<Library> {
     let is_other =
-        |library: &Library| library.sha256 != kept && library.info.as_ref().is_some_and(|info| info.name == name);
-    let others: Vec<Library> = installed.libraries().into_iter().filter(is_other).collect();
-    for other in &others {
-        installed.forbid(other.sha256)?;
-        std::fs::remove_dir_all(&other.directory).map_err(|error| failure(&other.directory, &error))?;
-    }
-    Ok(others)
+        |library: &Library| library.sha256 != newest && library.info.as_ref().is_some_and(|info| info.name == name);
+    installed.libraries().into_iter().filter(is_other).collect()
 }
 
 fn say(
     info: &PluginInfo,
     is_new: bool,
-    replaced: &[Library],
+    older: &[Library],
     checked: Option<&Checked>,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
@@ -85,7 +79,7 @@ fn say(
         let mut document = document::plugin_info(info);
         document["installed"] = json!(true);
         document["was_installed"] = json!(!is_new);
-        document["replaced"] = replaced.iter().map(|other| json!(other.sha256.to_string())).collect();
+        document["replaced"] = older.iter().map(|other| json!(other.sha256.to_string())).collect();
         document["check"] = checked.map_or(Value::Null, Checked::document);
         return console.document(&document);
     }
@@ -95,11 +89,12 @@ fn say(
     if let Some(path) = path {
         console.line(format_args!("  {path}"))?;
     }
-    for other in replaced {
-        console.line(format_args!("  replaces {}", other.sha256))?;
+    for other in older {
+        console.line(format_args!("  replaces {}, which stays for replay", other.sha256))?;
     }
     let tests = if checked.is_some() { "it passed every test" } else { "it was not checked" };
-    console.line(format_args!("  {tests}; \"resurvey plugins remove {}\" takes it away", info.name))
+    let which = if older.is_empty() { info.name.clone() } else { info.sha256.to_string() };
+    console.line(format_args!("  {tests}; \"resurvey plugins remove {which}\" takes it away"))
 }
 
 /// A copy of a plugin file beside its place, gone unless it is kept.

@@ -1,9 +1,10 @@
 //! `resurvey plugins list` and `resurvey plugins info`.
 
+use super::installed::{Older, builds_in, first_file};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
-use crate::tools::load;
+use crate::tools::{data_directory, load};
 use comfy_table::{Table, presets};
 use resurvey_core::plugin::Registry;
 use serde_json::json;
@@ -11,6 +12,8 @@ use serde_json::json;
 /// Lists what can be loaded, and with `is_verbose` where it was looked for and why a file was skipped.
 pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Result<u8, Failure> {
     let plugins = registry.list();
+    let older = data_directory().map(|data| builds_in(&data).1).unwrap_or_default();
+    let path_of = |build: &Older| first_file(&build.directory).unwrap_or_else(|| build.directory.clone());
     if console.is_json() {
         let skipped: Vec<_> = (registry.skipped().iter())
             .map(|skipped| json!({ "path": skipped.path.display().to_string(), "reason": skipped.refusal.to_string() }))
@@ -20,6 +23,9 @@ pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) ->
             "plugins": plugins.iter().map(document::plugin_info).collect::<Vec<_>>(),
             "directories": directories,
             "skipped": skipped,
+            "older": older.iter().map(|build| json!({
+                "name": build.name, "sha256": build.sha256.to_string(), "path": path_of(build).display().to_string(),
+            })).collect::<Vec<_>>(),
         }))?;
         return Ok(0);
     }
@@ -42,6 +48,9 @@ pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) ->
         }
         for skipped in registry.skipped() {
             console.line(&skipped.refusal)?;
+        }
+        for build in &older {
+            console.line(format_args!("kept {}, an older build of {}", path_of(build).display(), build.name))?;
         }
     }
     Ok(0)

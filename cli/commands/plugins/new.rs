@@ -2,7 +2,7 @@
 //! `plugins/templates`, which compile and pass as they are, with the name put in.
 
 use super::template::{self, Project};
-use crate::args::{Language, New};
+use crate::args::{Language, New, NewForm, NewKind};
 use crate::console::Console;
 use crate::failure::{Failure, INPUT};
 use anyhow::anyhow;
@@ -80,11 +80,23 @@ const TAKEN: &[&str] = &[
 pub fn run(options: &New, registry: &Registry, console: &mut Console<'_>) -> Result<u8, Failure> {
     let name = &options.name;
     is_free(name, registry)?;
+    if options.form == NewForm::Search && !matches!(options.kind, NewKind::Matcher) {
+        return Err(Failure::usage(format_args!(
+            "--form search is for a matcher; leave it out for --kind {}",
+            options.kind
+        )));
+    }
+    let is_scorer = matches!(options.kind, NewKind::Matcher) && options.form == NewForm::Score;
+    if matches!(options.lang, Language::Cpp) && !is_scorer {
+        return Err(Failure::usage(
+            "--lang cpp begins a matcher that scores; begin others with --lang c, whose headers are C++ as well",
+        ));
+    }
     let sdk = match options.lang {
         Language::Rust => Some(sdk(options.sdk.as_deref())?),
-        Language::C | Language::Python => None,
+        Language::C | Language::Cpp | Language::Python => None,
     };
-    let project = Project { name, kind: options.kind, language: options.lang, sdk };
+    let project = Project { name, kind: options.kind, form: options.form, language: options.lang, sdk };
     let directory = options.out.clone().unwrap_or_else(|| PathBuf::from(name));
     let files = template::files(&project);
     write(&directory, &files)?;
@@ -93,6 +105,7 @@ pub fn run(options: &New, registry: &Registry, console: &mut Console<'_>) -> Res
         console.document(&json!({
             "name": name,
             "kind": options.kind.to_string(),
+            "form": matches!(options.kind, NewKind::Matcher).then(|| options.form.to_string()),
             "lang": options.lang.to_string(),
             "directory": directory.display().to_string(),
             "files": paths,

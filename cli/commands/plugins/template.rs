@@ -1,6 +1,6 @@
 //! The files of `plugins/templates`, and what stands in them for a project.
 
-use crate::args::{Language, NewKind};
+use crate::args::{Language, NewForm, NewKind};
 
 /// Paths relative to the project, and texts before the project's words are put in.
 type Sources = Vec<(String, &'static str)>;
@@ -11,6 +11,8 @@ pub struct Project<'a> {
     pub name: &'a str,
     /// Its kind.
     pub kind: NewKind,
+    /// Its form; a matcher alone has two.
+    pub form: NewForm,
     /// Its language.
     pub language: Language,
     /// In Rust: the dependency on the SDK, as `Cargo.toml` says it.
@@ -43,15 +45,19 @@ const PACKAGE: [(&str, &str); 10] = package![
     "words.py"
 ];
 
+/// The contract, and the toy host of the project's test.
+const HEADERS: [(&str, &str); 2] = [
+    ("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h")),
+    ("resurvey_toy.h", include_str!("../../../plugins/toy/resurvey_toy.h")),
+];
+
 /// Path and text of every file, paths relative to the project.
 pub fn files(project: &Project<'_>) -> Vec<(String, String)> {
-    let kind = project.kind.to_string();
     let (sources, verbatim): (Sources, &[(&str, &str)]) = match project.language {
-        Language::Rust => (rust(project.kind), &[]),
-        Language::C => {
-            (c(project.kind), &[("resurvey_plugin.h", include_str!("../../../schema/include/resurvey_plugin.h"))])
-        }
-        Language::Python => (python(project.kind, &kind), &PACKAGE),
+        Language::Rust => (rust(project), &[]),
+        Language::C => (c(project), &HEADERS),
+        Language::Cpp => (cpp(), &HEADERS),
+        Language::Python => (python(project), &PACKAGE),
     };
     let written = sources.into_iter().map(|(path, text)| (path, filled_in(project, text)));
     written.chain(verbatim.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned()))).collect()
@@ -62,28 +68,44 @@ pub fn main_file(project: &Project<'_>) -> String {
     match project.language {
         Language::Rust => "src/lib.rs".to_owned(),
         Language::C => "plugin.c".to_owned(),
-        Language::Python => format!("{}.py", project.kind),
+        Language::Cpp => "plugin.cpp".to_owned(),
+        Language::Python => format!("{}.py", work(project)),
     }
 }
 
-/// What to type next, in the directory of the project.
+/// What the plugin does, which names its template: a matcher searches, or has the name of its kind.
+fn work(project: &Project<'_>) -> String {
+    match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Search) => "search".to_owned(),
+        (kind, _) => kind.to_string(),
+    }
+}
+
+/// What to type next, in the directory of the project, and at last where the user was before.
 pub fn steps(project: &Project<'_>) -> Vec<String> {
-    let (build, built) = match project.language {
-        Language::Rust => ("cargo build --release".to_owned(), format!("target/release/{}", library(project))),
-        Language::C => ("make".to_owned(), library(project)),
+    let (test, build, built) = match project.language {
+        Language::Rust => {
+            ("cargo test", "cargo build --release".to_owned(), format!("target/release/{}", library(project)))
+        }
+        Language::C | Language::Cpp => ("make test", "make".to_owned(), library(project)),
         Language::Python => (
-            format!("python3 -m resurvey_plugin build {}.py", project.kind),
+            "python3 -m unittest",
+            format!("python3 -m resurvey_plugin build {}", main_file(project)),
             format!("resurvey-plugin-{}", project.name),
         ),
     };
-    vec![build, format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"), usage(project)]
+    let (check, install) = (format!("resurvey plugins check {built}"), format!("resurvey plugins install {built}"));
+    // Back to where the map is.
+    vec![test.to_owned(), build, check, install, "cd -".to_owned(), usage(project)]
 }
 
-fn rust(kind: NewKind) -> Sources {
-    let source = match kind {
-        NewKind::Matcher => template!("rust/matcher.rs"),
-        NewKind::Detector => template!("rust/detector.rs"),
-        NewKind::Estimator => template!("rust/estimator.rs"),
+fn rust(project: &Project<'_>) -> Sources {
+    let source = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => template!("rust/matcher.rs"),
+        (NewKind::Matcher, NewForm::Search) => template!("rust/search.rs"),
+        (NewKind::Detector, _) => template!("rust/detector.rs"),
+        (NewKind::Estimator, _) => template!("rust/estimator.rs"),
+        (NewKind::Segmenter, _) => template!("rust/segmenter.rs"),
     };
     vec![
         ("Cargo.toml".to_owned(), template!("rust/Cargo.toml.in")),
@@ -93,29 +115,44 @@ fn rust(kind: NewKind) -> Sources {
     ]
 }
 
-fn c(kind: NewKind) -> Sources {
-    let source = match kind {
-        NewKind::Matcher => template!("c/matcher.c"),
-        NewKind::Detector => template!("c/detector.c"),
-        NewKind::Estimator => template!("c/estimator.c"),
+fn c(project: &Project<'_>) -> Sources {
+    let (source, test) = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => (template!("c/matcher.c"), template!("c/test_matcher.c")),
+        (NewKind::Matcher, NewForm::Search) => (template!("c/search.c"), template!("c/test_search.c")),
+        (NewKind::Detector, _) => (template!("c/detector.c"), template!("c/test_detector.c")),
+        (NewKind::Estimator, _) => (template!("c/estimator.c"), template!("c/test_estimator.c")),
+        (NewKind::Segmenter, _) => (template!("c/segmenter.c"), template!("c/test_segmenter.c")),
     };
     vec![
         ("plugin.c".to_owned(), source),
+        ("test.c".to_owned(), test),
         ("Makefile".to_owned(), template!("c/Makefile")),
         ("README.md".to_owned(), template!("c/README.md")),
-        (".gitignore".to_owned(), "*.so\n"),
+        (".gitignore".to_owned(), "*.so\ntoy-test\n"),
     ]
 }
 
-fn python(kind: NewKind, name: &str) -> Sources {
-    let (source, test) = match kind {
-        NewKind::Matcher => (template!("python/matcher.py"), template!("python/test_matcher.py")),
-        NewKind::Detector => (template!("python/detector.py"), template!("python/test_detector.py")),
-        NewKind::Estimator => (template!("python/estimator.py"), template!("python/test_estimator.py")),
+fn cpp() -> Sources {
+    vec![
+        ("plugin.cpp".to_owned(), template!("cpp/matcher.cpp")),
+        ("test.c".to_owned(), template!("c/test_matcher.c")),
+        ("Makefile".to_owned(), template!("cpp/Makefile")),
+        ("README.md".to_owned(), template!("cpp/README.md")),
+        (".gitignore".to_owned(), "*.so\n*.o\ntoy-test\n"),
+    ]
+}
+
+fn python(project: &Project<'_>) -> Sources {
+    let (source, test) = match (project.kind, project.form) {
+        (NewKind::Matcher, NewForm::Score) => (template!("python/matcher.py"), template!("python/test_matcher.py")),
+        (NewKind::Matcher, NewForm::Search) => (template!("python/search.py"), template!("python/test_search.py")),
+        (NewKind::Detector, _) => (template!("python/detector.py"), template!("python/test_detector.py")),
+        (NewKind::Estimator, _) => (template!("python/estimator.py"), template!("python/test_estimator.py")),
+        (NewKind::Segmenter, _) => (template!("python/segmenter.py"), template!("python/test_segmenter.py")),
     };
     vec![
-        (format!("{name}.py"), source),
-        (format!("test_{name}.py"), test),
+        (main_file(project), source),
+        (format!("test_{}", main_file(project)), test),
         ("README.md".to_owned(), template!("python/README.md")),
         (".gitignore".to_owned(), "__pycache__/\nresurvey-plugin-*\n"),
     ]
@@ -128,6 +165,7 @@ fn filled_in(project: &Project<'_>, text: &str) -> String {
         .replace("my_plugin", &project.name.replace('-', "_"))
         .replace(&placeholder, &type_name(project))
         .replace("@KIND@", &project.kind.to_string())
+        .replace("@FILE@", &main_file(project))
         .replace("@USE@", &usage(project))
         .replace("@SDK@", &format!("resurvey-plugin = {}", project.sdk.as_deref().unwrap_or_default()))
 }
@@ -154,10 +192,10 @@ fn library(project: &Project<'_>) -> String {
 }
 
 fn usage(project: &Project<'_>) -> String {
-    let (command, kind) = match project.kind {
-        NewKind::Matcher => ("localize", "matcher"),
-        NewKind::Detector => ("update", "detector"),
-        NewKind::Estimator => ("update", "estimator"),
+    let (command, more) = match project.kind {
+        NewKind::Matcher => ("localize", ""),
+        NewKind::Detector | NewKind::Estimator => ("update", ""),
+        NewKind::Segmenter => ("localize", " --photo photo.jpg"),
     };
-    format!("resurvey {command} city.rsv capture.json --{kind} {}", project.name)
+    format!("resurvey {command} city.rsv capture.json{more} --{} {}", project.kind, project.name)
 }

@@ -18,7 +18,7 @@ pub fn run(name: &str, file: &Path, report: &Path, limits: Limits) -> Result<u8,
         program: std::env::current_exe().ok(),
         call_limit: Duration::from_secs_f64(limits.time_limit),
         memory_mib: limits.memory_limit,
-        crashes: None,
+        forgets: true,
     };
     examine(trial, file, &Street::new(), isolation, &Report::new(opened));
     Ok(0)

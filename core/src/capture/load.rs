@@ -30,6 +30,12 @@ pub struct Capture {
 }
 
 impl Capture {
+    /// Digest of what the photo shows, its size and classes: the same for one photo in two files, or with two priors.
+    pub fn photo_digest(&self) -> Digest {
+        let size = [self.labels.width(), self.labels.height()].map(u32::to_le_bytes).concat();
+        Digest::of(&[&size, self.labels.values()].concat())
+    }
+
     /// Reads `path` and the label image that it names, for a map with `classes` in `crs`. The whole prior must be in the
     /// file; [`RoughCapture`] also reads others.
     pub fn read(path: &Path, classes: &ClassTable, crs: Crs) -> Result<Self, CaptureError> {

@@ -46,10 +46,16 @@ impl ViewPhoto {
         Self { camera: camera.subsampled(request.stride), photo, classes, spare: Mutex::default() }
     }
 
-    /// Fills `counts[pose][class]`.
-    pub fn compare(&self, scene: &Scene, poses: &[Pose], counts: &mut [ClassCounts]) {
+    /// Fills `counts[pose][class]`, or some of them once `cancelled` says so.
+    pub fn compare(
+        &self,
+        scene: &Scene,
+        poses: &[Pose],
+        counts: &mut [ClassCounts],
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) {
         let per_pose = poses.par_chunks(TOGETHER).zip(counts.par_chunks_mut((TOGETHER * self.classes).max(1)));
-        per_pose.for_each(|(poses, counts)| {
+        per_pose.filter(|_| !cancelled()).for_each(|(poses, counts)| {
             self.with_comparer(|comparer| {
                 for (pose, counts) in poses.iter().zip(counts.chunks_mut(self.classes.max(1))) {
                     self.compare_one(comparer, scene, pose, counts);
@@ -141,14 +147,21 @@ impl PositionPhoto {
         Self { grid, photo, request: *request, classes, first, wanted, columns, spare: Mutex::default() }
     }
 
-    /// Fills `counts[position][heading][class]`; fastest when positions come in rows of the same northing.
-    pub fn compare(&self, scene: &Scene, positions: &[GridPoint], counts: &mut [ClassCounts]) {
+    /// Fills `counts[position][heading][class]`, or some of them once `cancelled` says so; fastest when positions come in
+    /// rows of the same northing.
+    pub fn compare(
+        &self,
+        scene: &Scene,
+        positions: &[GridPoint],
+        counts: &mut [ClassCounts],
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) {
         let per_position = (self.request.yaw_count as usize * self.classes).max(1);
         let mut work: Vec<Position> = positions.iter().copied().zip(counts.chunks_mut(per_position)).collect();
         // Every other row backwards, so that each position is next to the one before.
         let rows = work.chunk_by_mut(|a, b| a.0.northing_m.to_bits() == b.0.northing_m.to_bits());
         rows.skip(1).step_by(2).for_each(<[Position]>::reverse);
-        work.par_chunks_mut(POSITIONS_TOGETHER).for_each(|positions| {
+        work.par_chunks_mut(POSITIONS_TOGETHER).filter(|_| !cancelled()).for_each(|positions| {
             let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let (mut panorama, mut planes) = spare.unwrap_or_else(|| {
                 (Panorama::new(&self.grid, &self.wanted), ClassPlanes::new(&self.grid, self.classes))

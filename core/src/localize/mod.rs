@@ -1,5 +1,6 @@
 //! Where the phone stood: the services that matchers use, the host-driven search, the reliability gate and the heat map.
 
+mod arguments;
 mod candidates;
 mod compare;
 mod exhaustive;

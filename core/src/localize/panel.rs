@@ -32,17 +32,19 @@ impl<'m> Panel<'m> {
         names.join(" + ")
     }
 
-    /// What each says of `count` views, view by view; `view` hands view `index` to its second argument.
+    /// What each says of `count` views, view by view, unless it is cancelled; `view` hands view `index` to its second
+    /// argument.
     pub fn scores(
         &mut self,
         photo: &LabelImage,
         count: usize,
         view: &mut MakeView<'_>,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<f64>, PluginError> {
         let members = self.members.len();
         let mut scores = vec![f64::NAN; count * members];
         for (member, (matcher, _)) in self.members.iter_mut().enumerate() {
-            for (index, score) in matcher.score_each(photo, count, view)?.into_iter().enumerate() {
+            for (index, score) in matcher.score_each(photo, count, view, cancelled)?.into_iter().enumerate() {
                 scores[index * members + member] = score;
             }
         }

@@ -1,8 +1,9 @@
 //! The services of the host on a world and a capture.
 
 use super::World;
+use super::arguments;
 use super::compare::{PositionPhoto, ViewPhoto};
-use crate::camera::{Camera, camera_from_world, world_from_camera};
+use crate::camera::{camera_from_world, world_from_camera};
 use crate::capture::Capture;
 use crate::crs::Crs;
 use crate::plugin::{Listener, ServiceError, Services, ViewImages, class_slots};
@@ -11,6 +12,9 @@ use nalgebra::Vector3;
 use resurvey_schema::service::{ClassCounts, CompareRequest, Level, PanoramaRequest, RayHit};
 use resurvey_schema::{ClassTable, Descriptor, GridPoint, Pose, Wgs84};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Ways to compare, and heights of cuts, that are kept ready for the next request: a search uses a handful.
+const MOST_KEPT: usize = 8;
 
 /// Hears nothing and never cancels.
 pub struct Silent;
@@ -71,48 +75,26 @@ impl<'a> SceneServices<'a> {
     fn classes_count(&self) -> usize {
         class_slots(self.world.classes())
     }
+
+    /// A service that takes long ends with the call that it is for.
+    fn not_cancelled(&self) -> Result<(), ServiceError> {
+        if self.cancelled() { Err(ServiceError("the call was cancelled".to_owned())) } else { Ok(()) }
+    }
 }
 
-/// The photo prepared for `request`, made once and kept.
+/// What was prepared for `request`, made now unless it is one of the last few: a plugin may ask in ever new ways.
 fn prepared<R: Copy + PartialEq, P>(
     kept: &Mutex<Vec<(R, Arc<P>)>>,
     request: &R,
     prepare: impl FnOnce() -> P,
 ) -> Arc<P> {
     let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, photo)) = kept.iter().find(|(known, _)| known == request) {
-        return Arc::clone(photo);
-    }
-    let photo = Arc::new(prepare());
-    kept.push((*request, Arc::clone(&photo)));
-    photo
-}
-
-fn finite(what: &str, values: impl IntoIterator<Item = f64>) -> Result<(), ServiceError> {
-    match values.into_iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(ServiceError(format!("{what}: expected finite numbers, found {value}"))),
-        None => Ok(()),
-    }
-}
-
-fn finite_poses(poses: &[Pose]) -> Result<(), ServiceError> {
-    let numbers = |pose: &Pose| {
-        let [east, north, height]: [f64; 3] = pose.position.into();
-        [east, north, height, pose.yaw_rad, pose.pitch_rad, pose.roll_rad]
-    };
-    finite("pose", poses.iter().flat_map(numbers))
-}
-
-fn finite_points(points: &[GridPoint]) -> Result<(), ServiceError> {
-    finite("position", points.iter().flat_map(|point| <[f64; 3]>::from(*point)))
-}
-
-fn checked_stride(stride: u32, camera: &Camera) -> Result<(), ServiceError> {
-    let longest = camera.width().min(camera.height());
-    if (1..=longest).contains(&stride) {
-        return Ok(());
-    }
-    Err(ServiceError(format!("stride is {stride}; expected 1 to {longest}")))
+    let known = kept.iter().position(|(known, _)| known == request).map(|index| kept.remove(index));
+    let (request, made) = known.unwrap_or_else(|| (*request, Arc::new(prepare())));
+    kept.push((request, Arc::clone(&made)));
+    let excess = kept.len().saturating_sub(MOST_KEPT);
+    kept.drain(..excess);
+    made
 }
 
 impl Services for SceneServices<'_> {
@@ -127,11 +109,12 @@ impl Services for SceneServices<'_> {
         poses: &[Pose],
         receive: &mut dyn FnMut(&ViewImages<'_>),
     ) -> Result<(), ServiceError> {
-        checked_stride(stride, &self.capture.camera)?;
-        finite_poses(poses)?;
+        arguments::stride(stride, &self.capture.camera)?;
+        arguments::poses(poses)?;
         let camera = self.capture.camera.subsampled(stride);
         let scene = self.world.scene(with_descriptors);
         for pose in poses {
+            self.not_cancelled()?;
             let view = view(scene, &camera, pose);
             receive(&ViewImages {
                 origin: view.origin,
@@ -151,14 +134,13 @@ impl Services for SceneServices<'_> {
         poses: &[Pose],
         counts: &mut [ClassCounts],
     ) -> Result<(), ServiceError> {
-        checked_stride(request.stride, &self.capture.camera)?;
-        finite("boundary tolerance", [request.boundary_tolerance_px])?;
-        finite_poses(poses)?;
+        arguments::comparison(request, &self.capture.camera)?;
+        arguments::poses(poses)?;
         let photo = prepared(&self.view_photos, request, || {
             ViewPhoto::new(&self.capture.labels, &self.capture.camera, self.classes_count(), request)
         });
-        photo.compare(self.world.scene(true), poses, counts);
-        Ok(())
+        photo.compare(self.world.scene(true), poses, counts, &|| self.cancelled());
+        self.not_cancelled()
     }
 
     fn compare_panoramas(
@@ -167,32 +149,33 @@ impl Services for SceneServices<'_> {
         positions: &[GridPoint],
         counts: &mut [ClassCounts],
     ) -> Result<(), ServiceError> {
-        finite("panorama", [request.pitch_rad, request.roll_rad, request.first_yaw_rad])?;
-        finite_points(positions)?;
-        if !(4..=7200).contains(&request.columns) {
-            return Err(ServiceError(format!("columns is {}; expected 4 to 7200", request.columns)));
-        }
+        arguments::panorama(request)?;
+        arguments::points(positions)?;
         let photo = prepared(&self.position_photos, request, || {
             PositionPhoto::new(&self.capture.labels, &self.capture.camera, self.classes_count(), request)
         });
-        photo.compare(self.world.scene(true), positions, counts);
-        Ok(())
+        photo.compare(self.world.scene(true), positions, counts, &|| self.cancelled());
+        self.not_cancelled()
     }
 
     fn inside_solid(&self, positions: &[GridPoint]) -> Result<Vec<bool>, ServiceError> {
-        finite_points(positions)?;
-        let inside = |position: &GridPoint| {
-            let solids = prepared(&self.solids, &position.height_m.to_bits(), || {
-                SolidMask::at_height(self.world.scene(false), position.height_m)
-            });
-            solids.contains(*position)
-        };
-        Ok(positions.iter().map(inside).collect())
+        arguments::points(positions)?;
+        let height_m = |index: &usize| positions[*index].height_m;
+        let mut order: Vec<usize> = (0..positions.len()).collect();
+        order.sort_by(|a, b| height_m(a).total_cmp(&height_m(b)));
+        let mut inside = vec![false; positions.len()];
+        for level in order.chunk_by(|a, b| height_m(a).to_bits() == height_m(b).to_bits()) {
+            self.not_cancelled()?;
+            let cut_m = height_m(&level[0]);
+            let make = || SolidMask::at_height(self.world.scene(false), cut_m);
+            let solids = prepared(&self.solids, &cut_m.to_bits(), make);
+            level.iter().for_each(|index| inside[*index] = solids.contains(positions[*index]));
+        }
+        Ok(inside)
     }
 
     fn pixel_rays(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Result<Vec<[f64; 3]>, ServiceError> {
-        finite_poses(&[*pose])?;
-        finite("pixel", pixels.iter().flatten().copied())?;
+        arguments::poses(&[*pose])?;
         let map_from_camera = world_from_camera(pose);
         let ray = |[u, v]: &[f64; 2]| {
             let ray = self.capture.camera.ray(*u, *v);
@@ -203,8 +186,8 @@ impl Services for SceneServices<'_> {
     }
 
     fn project(&self, pose: &Pose, points: &[GridPoint]) -> Result<Vec<Option<[f64; 2]>>, ServiceError> {
-        finite_poses(&[*pose])?;
-        finite_points(points)?;
+        arguments::poses(&[*pose])?;
+        arguments::points(points)?;
         let camera_from_map = camera_from_world(pose);
         let eye = pose.position;
         let pixel = |point: &GridPoint| {
@@ -225,8 +208,7 @@ impl Services for SceneServices<'_> {
         limit_m: f64,
         with_descriptors: bool,
     ) -> Result<Vec<Option<RayHit>>, ServiceError> {
-        finite_points(&[origin])?;
-        finite("direction", directions.iter().flatten().copied())?;
+        arguments::points(&[origin])?;
         let scene = self.world.scene(with_descriptors);
         let rays = self.rays(with_descriptors);
         let fid = |feature: u32| {
@@ -242,7 +224,7 @@ impl Services for SceneServices<'_> {
     }
 
     fn descriptors_near(&self, point: GridPoint, radius_m: f64) -> Result<Vec<(u64, Descriptor)>, ServiceError> {
-        finite_points(&[point])?;
+        arguments::points(&[point])?;
         let near =
             |anchor: GridPoint| anchor.plan_distance_m(&point).hypot(anchor.height_m - point.height_m) <= radius_m;
         let found = self.world.descriptors().iter().filter(|(_, descriptor)| near(descriptor.anchor()));
@@ -250,7 +232,7 @@ impl Services for SceneServices<'_> {
     }
 
     fn ground_height(&self, point: GridPoint) -> Result<Option<f64>, ServiceError> {
-        finite_points(&[point])?;
+        arguments::points(&[point])?;
         Ok(self.rays(false).ground_below(point).map(|hit| hit.point.height_m))
     }
 
@@ -274,3 +256,6 @@ impl Services for SceneServices<'_> {
         self.listener.cancelled()
     }
 }
+
+#[cfg(test)]
+mod tests;

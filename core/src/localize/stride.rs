@@ -37,7 +37,7 @@ impl<'a, 's> Strided<'a, 's> {
                 return Err(PluginError::Cancelled { plugin: panel.name(), call: "score" });
             }
             let views: Vec<View> = poses.par_iter().map(|pose| view(scene, &self.camera, pose)).collect();
-            scores.extend(panel.scores(&self.photo, views.len(), &mut |index, take| {
+            let lend = &mut |index: usize, take: &mut dyn FnMut(&ViewImages<'_>)| {
                 let view = &views[index];
                 take(&ViewImages {
                     origin: view.origin,
@@ -47,7 +47,9 @@ impl<'a, 's> Strided<'a, 's> {
                     features: &view.features,
                     feature_table: scene.feature_table(),
                 });
-            })?);
+            };
+            let cancelled = || self.services.cancelled();
+            scores.extend(panel.scores(&self.photo, views.len(), lend, &cancelled)?);
         }
         Ok(scores)
     }

@@ -39,12 +39,17 @@ pub enum ClassMapError {
     },
 }
 
+/// What the parser says, and in which line.
+fn not_toml(text: &str, error: &toml::de::Error) -> ClassMapError {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    ClassMapError::Toml(format!("line {line}: {}", error.message().trim()))
+}
+
 impl ClassMap {
     /// The map in a TOML text of lines `"name" = "class"`; the key `default` is for every other name.
     pub fn parse(text: &str, classes: &ClassTable) -> Result<Self, ClassMapError> {
-        let table: toml::Table = text
-            .parse()
-            .map_err(|error: toml::de::Error| ClassMapError::Toml(error.to_string().trim().replace('\n', " | ")))?;
+        let table: toml::Table = text.parse().map_err(|error| not_toml(text, &error))?;
         let mut map = Self::default();
         for (name, value) in table {
             let toml::Value::String(class) = value else {

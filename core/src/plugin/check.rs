@@ -1,6 +1,8 @@
 //! What the host checks in every answer before anyone sees it.
 
 use crate::image::LabelImage;
+use crate::version::{FeatureState, InvalidState, UNIT_TOLERANCE};
+use nalgebra::DMatrix;
 use resurvey_schema::{
     ChangeRegion, ClassId, ClassKind, ClassTable, Descriptor, GridPoint, Localization, Proposal, Uncertainty,
 };
@@ -10,6 +12,11 @@ use std::fmt::Display;
 const NORMAL_TOLERANCE: f64 = 1e-6;
 /// How far a covariance may be from symmetric, relative to its largest entry: rounding of one matrix product.
 const SYMMETRY_TOLERANCE: f64 = 1e-9;
+/// How far below zero a correlation matrix may reach, likewise: rounding, and what a plugin wrote with nine digits.
+const DEFINITE_TOLERANCE: f64 = 1e-6;
+/// Characters of the texts that the map keeps: a name, and a unit.
+const LONGEST_NAME: usize = 64;
+const LONGEST_UNIT: usize = 16;
 
 /// A value that breaks a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +59,40 @@ fn not_negative(field: &str, value: f64) -> Checked {
     if value.is_finite() && value >= 0.0 { Ok(()) } else { violation(field, &value, "a finite number of at least 0") }
 }
 
+/// No direction has a variance below zero: the correlations, which have no units, are those of a covariance.
+fn no_negative_variance<const N: usize>(field: &str, covariance: &[[f64; N]; N]) -> Checked {
+    let correlation = |row: usize, column: usize| {
+        let product = (covariance[row][row] * covariance[column][column]).sqrt();
+        match covariance[row][column] {
+            _ if row == column => 1.0 + DEFINITE_TOLERANCE,
+            // Without variance there is nothing to be correlated with.
+            value if product <= 0.0 => value.abs() * f64::INFINITY,
+            value => value / product,
+        }
+    };
+    let correlations = DMatrix::from_fn(N, N, |row, column| {
+        let value = correlation(row, column);
+        if value.is_nan() { 0.0 } else { value }
+    });
+    match correlations.cholesky() {
+        Some(_) => Ok(()),
+        None => violation(field, &format_args!("{covariance:?}"), "no variance below zero in any direction"),
+    }
+}
+
+/// A line of text that fits into a table.
+fn line(field: &str, text: &str, longest: usize) -> Checked {
+    if text.chars().count() <= longest && !text.contains(char::is_control) {
+        return Ok(());
+    }
+    let shown: String = text.chars().take(longest).collect();
+    violation(
+        field,
+        &format_args!("{shown:?}…"),
+        format!("at most {longest} characters, none of them a control character"),
+    )
+}
+
 fn point(field: &str, point: GridPoint) -> Checked {
     finite(field, &<[f64; 3]>::from(point))
 }
@@ -84,11 +125,13 @@ pub(super) fn localization(found: &Localization) -> Checked {
         }
     }
     (0..3).try_for_each(|axis| not_negative(&format!("covariance[{axis}][{axis}]"), c[axis][axis]))?;
+    no_negative_variance("covariance", c)?;
     if let Some(alignment) = &found.alignment {
         finite("alignment.covariance", alignment.covariance.as_flattened())?;
         (0..6).try_for_each(|axis| {
             not_negative(&format!("alignment.covariance[{axis}][{axis}]"), alignment.covariance[axis][axis])
         })?;
+        no_negative_variance("alignment.covariance", &alignment.covariance)?;
         not_negative("alignment.map_sigma_m", alignment.map_sigma_m)?;
         not_negative("alignment.label_sigma_px", alignment.label_sigma_px)?;
     }
@@ -144,7 +187,8 @@ impl Rules<'_> {
         Ok(())
     }
 
-    pub(super) fn proposal(&self, index: usize, proposal: &Proposal) -> Checked {
+    /// Checks a proposal, and gives a normal that was computed in `f32` the length that the map asks for.
+    pub(super) fn proposal(&self, index: usize, proposal: &mut Proposal) -> Checked {
         let field = |name: &str| format!("proposal[{index}].{name}");
         let (Proposal::Place { region, .. } | Proposal::Remove { region, .. } | Proposal::Reject { region, .. }) =
             proposal;
@@ -164,13 +208,15 @@ impl Rules<'_> {
                 if rejection.requirement.is_empty() {
                     return violation(field("requirement"), &"\"\"", "a short name");
                 }
+                line(&field("requirement"), &rejection.requirement, LONGEST_NAME)?;
+                line(&field("unit"), &rejection.unit, LONGEST_UNIT)?;
                 finite(&field("measured"), &[rejection.measured])?;
                 finite(&field("limit"), &[rejection.limit])
             }
         }
     }
 
-    fn descriptor(&self, field: &str, descriptor: &Descriptor) -> Checked {
+    fn descriptor(&self, field: &str, descriptor: &mut Descriptor) -> Checked {
         match descriptor {
             Descriptor::Material(material) => {
                 self.kind(&format!("{field}.class"), material.class, ClassKind::Material)?;
@@ -186,6 +232,9 @@ impl Rules<'_> {
                         "a unit vector",
                     );
                 }
+                if off > UNIT_TOLERANCE {
+                    material.normal = material.normal.map(|n| n / length);
+                }
             }
             Descriptor::Dynamic(dynamic) => {
                 self.kind(&format!("{field}.class"), dynamic.class, ClassKind::Dynamic)?;
@@ -196,10 +245,29 @@ impl Rules<'_> {
                 }
             }
         }
-        let Some(Uncertainty { position_m, size_m, area_m2 }) = descriptor.sigma() else { return Ok(()) };
-        [Some(position_m), size_m, area_m2]
-            .into_iter()
-            .flatten()
-            .try_for_each(|sigma| not_negative(&format!("{field}.sigma"), sigma))
+        if let Some(Uncertainty { position_m, size_m, area_m2 }) = descriptor.sigma() {
+            let sigmas = [Some(position_m), size_m, area_m2].into_iter().flatten();
+            sigmas.into_iter().try_for_each(|sigma| not_negative(&format!("{field}.sigma"), sigma))?;
+        }
+        // What the map would not take later is the plugin's doing, and told as that.
+        let state = FeatureState::Descriptor(descriptor.clone());
+        state.validate(self.classes).or_else(|invalid| not_for_the_map(field, &invalid))
+    }
+}
+
+fn not_for_the_map(field: &str, invalid: &InvalidState) -> Checked {
+    let corners = || format!("{field}.corners");
+    match invalid {
+        InvalidState::CornerOrder { corner } => violation(
+            corners(),
+            &format_args!("corner {corner} of 0…3 that does not turn left as seen from outside"),
+            "bottom-left, bottom-right, top-right, top-left, as the normal shows outside",
+        ),
+        InvalidState::NotPlane { corner, distance_m, limit_m } => violation(
+            corners(),
+            &format_args!("corner {corner} of 0…3 at {distance_m:.3} m from the plane of the four"),
+            format!("at most {limit_m:.3} m"),
+        ),
+        other => violation(field, &other, "what a map can hold"),
     }
 }

@@ -72,7 +72,7 @@ pub enum PluginError {
         call: &'static str,
     },
     /// The process of the plugin died, or left.
-    #[error("plugin {plugin} crashed in {call}: {how}")]
+    #[error("plugin {plugin} crashed in {call}: {how}; \"resurvey plugins check FILE\" says more for its author")]
     Crashed {
         /// Its name.
         plugin: String,
@@ -82,7 +82,10 @@ pub enum PluginError {
         how: String,
     },
     /// The process of the plugin said something that is no message, or not its turn.
-    #[error("plugin {plugin} broke the wire in {call}: expected {expected}, found {found}")]
+    #[error(
+        "plugin {plugin} broke the wire in {call}: expected {expected}, found {found}; \"resurvey plugins check FILE\" says more \
+         for its author"
+    )]
     Garbled {
         /// Its name.
         plugin: String,

@@ -15,8 +15,9 @@ pub struct PluginInfo {
     pub version: String,
     /// One sentence.
     pub summary: String,
-    /// Of the library file. A built-in plugin has no file: the digest of its name, version, summary and settings schema,
-    /// so that the same program gives the same evidence on every machine.
+    /// Of the plugin's file. A built-in plugin has no file of its own: the digest of its name, version, summary and
+    /// settings schema and of the program that it is part of. So the same program gives the same evidence on every machine,
+    /// and one with other code gives another.
     pub sha256: Digest,
     /// The library file; `None` when built in.
     pub path: Option<PathBuf>,

@@ -54,6 +54,10 @@ impl Instance {
         let text = Text::of(settings.as_json());
         // SAFETY: the function came from the plugin's own entry; text, place and buffer live until it returns.
         let status = unsafe { create(text, &raw mut instance.pointer, &raw mut error) };
+        if status != STATUS_OK {
+            // Whatever a plugin has left there, it has made no instance that is to be ended.
+            instance.pointer = null_mut();
+        }
         instance.check("create", status, &error, false)?;
         Ok(instance)
     }
@@ -78,10 +82,11 @@ impl Instance {
         }
         let mut error = self.error.lend();
         let status = body(&self.table, self.pointer, &raw mut error);
-        if status == STATUS_OK {
+        let cancelled = cancelled();
+        if status == STATUS_OK && !cancelled {
             return Ok(());
         }
-        self.check(call, status, &error, cancelled())
+        self.check(call, status, &error, cancelled)
     }
 
     fn check(
@@ -93,12 +98,13 @@ impl Instance {
     ) -> Result<(), PluginError> {
         let (plugin, text) = (self.name(), self.error.text(error));
         match status {
-            STATUS_OK => Ok(()),
             STATUS_PANICKED => {
                 self.poisoned = true;
                 Err(PluginError::Panicked { plugin, call, text })
             }
+            // What is done after a cancel may be done by half.
             _ if cancelled || status == STATUS_CANCELLED => Err(PluginError::Cancelled { plugin, call }),
+            STATUS_OK => Ok(()),
             _ => Err(PluginError::Failed { plugin, call, text }),
         }
     }

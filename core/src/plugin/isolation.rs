@@ -1,6 +1,5 @@
 //! How plugins from files are kept apart from the host.
 
-use super::crashes::CrashLog;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -12,10 +11,11 @@ pub struct Isolation {
     pub program: Option<PathBuf>,
     /// Own time that a plugin has for one call; scoring one view is a call.
     pub call_limit: Duration,
-    /// Address space, MiB; 0 is no limit.
+    /// Address space, MiB, as far as the system allows it; 0 is no limit.
     pub memory_mib: u64,
-    /// Where crashes are counted; without it nothing is ever quarantined.
-    pub crashes: Option<CrashLog>,
+    /// Whether what was lent is overwritten after each call, and lent elsewhere in the next: for tests, which find a plugin
+    /// that keeps it.
+    pub forgets: bool,
 }
 
 impl Isolation {
@@ -31,7 +31,7 @@ impl Default for Isolation {
             program: None,
             call_limit: Duration::from_secs_f64(Self::DEFAULT_CALL_LIMIT_S),
             memory_mib: Self::DEFAULT_MEMORY_MIB,
-            crashes: None,
+            forgets: false,
         }
     }
 }

@@ -5,11 +5,12 @@ use super::error::PluginError;
 use super::info::PluginInfo;
 use super::input::{ComparisonInput, PhotoInput, ViewImages};
 use super::instance::Instance;
+use super::lend::{self, LentComparison};
+use super::line;
 use super::open::{Code, Plugin};
 use super::process::Apart;
 use super::services::Services;
 use super::settings::Settings;
-use super::{lend, line};
 use crate::image::LabelImage;
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::{ChangeRegion, Localization, Proposal};
@@ -87,23 +88,27 @@ impl Matcher {
         match &mut self.0 {
             // SAFETY: photo and view are borrowed for longer than the call.
             Body::Here(instance) => unsafe { line::score(instance, &lend::image(photo), &lend::view(view)) },
-            Body::Apart(instance) => Ok(instance.scores(photo, 1, &mut |_, take| take(view))?[0]),
+            Body::Apart(instance) => Ok(instance.scores(photo, 1, &mut |_, take| take(view), &|| false)?[0]),
         }
     }
 
     /// Similarity of photo and `count` views, in order. `view` hands view `index` to its second argument; a plugin in
-    /// another process scores one batch of them while the next is made.
+    /// another process scores one batch of them while the next is made. Once `cancelled` says so, it ends with an error.
     pub fn score_each(
         &mut self,
         photo: &LabelImage,
         count: usize,
         view: &mut MakeView<'_>,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<f64>, PluginError> {
         if let Body::Apart(instance) = &mut self.0 {
-            return instance.scores(photo, count, view);
+            return instance.scores(photo, count, view, cancelled);
         }
         let mut scores = Vec::with_capacity(count);
         for index in 0..count {
+            if cancelled() {
+                return Err(PluginError::Cancelled { plugin: self.info().name.clone(), call: "score" });
+            }
             let mut score = Ok(f64::NAN);
             view(index, &mut |view| score = self.score(photo, view));
             scores.push(score?);
@@ -166,9 +171,9 @@ impl Detector {
             Body::Here(instance) => instance,
             Body::Apart(instance) => return instance.detect(services, input),
         };
-        let lent = Lent::new(input);
+        let lent = LentComparison::new(input);
         // SAFETY: what the comparison points to lives in this function, or is borrowed for longer.
-        unsafe { line::detect(instance, services, &lent.comparison(input)) }
+        unsafe { line::detect(instance, services, &lent.record()) }
     }
 
     /// As [`Matcher::finish`].
@@ -205,41 +210,14 @@ impl Estimator {
             Body::Here(instance) => instance,
             Body::Apart(instance) => return instance.estimate(services, input, regions),
         };
-        let lent = Lent::new(input);
+        let lent = LentComparison::new(input);
         let records: Vec<_> = regions.iter().map(lend::region).collect();
         // SAFETY: what comparison and records point to lives in this function, or is borrowed for longer.
-        unsafe { line::estimate(instance, services, &lent.comparison(input), &records) }
+        unsafe { line::estimate(instance, services, &lent.record(), &records) }
     }
 
     /// As [`Matcher::finish`].
     pub fn finish(&mut self) -> Result<(), PluginError> {
         self.0.finish()
-    }
-}
-
-/// What a comparison points to.
-struct Lent {
-    view: abi::View,
-    camera: abi::Camera,
-    estimate: abi::PoseEstimate,
-}
-
-impl Lent {
-    fn new(input: &ComparisonInput<'_>) -> Self {
-        Self {
-            view: lend::view(&input.view),
-            camera: lend::camera(input.camera),
-            estimate: lend::estimate(input.estimate),
-        }
-    }
-
-    fn comparison(&self, input: &ComparisonInput<'_>) -> abi::Comparison {
-        abi::Comparison {
-            photo: lend::image(input.photo),
-            view: &raw const self.view,
-            camera: &raw const self.camera,
-            estimate: &raw const self.estimate,
-            ..abi::Comparison::new()
-        }
     }
 }

@@ -89,6 +89,37 @@ pub(super) fn view(view: &ViewImages<'_>) -> abi::View {
     }
 }
 
+/// What a comparison points to.
+pub(super) struct LentComparison {
+    pub photo: abi::Image,
+    pub view: abi::View,
+    pub camera: abi::Camera,
+    pub estimate: abi::PoseEstimate,
+}
+
+impl LentComparison {
+    /// Points to the rasters of `input`.
+    pub(super) fn new(input: &ComparisonInput<'_>) -> Self {
+        Self {
+            photo: image(input.photo),
+            view: view(&input.view),
+            camera: camera(input.camera),
+            estimate: estimate(input.estimate),
+        }
+    }
+
+    /// The comparison, valid as long as `self` is not moved or dropped.
+    pub(super) fn record(&self) -> abi::Comparison {
+        abi::Comparison {
+            photo: self.photo,
+            view: &raw const self.view,
+            camera: &raw const self.camera,
+            estimate: &raw const self.estimate,
+            ..abi::Comparison::new()
+        }
+    }
+}
+
 /// What keeps the rasters of `input` from being one comparison.
 pub(super) fn size_conflict(input: &ComparisonInput<'_>) -> Option<String> {
     let photo = (input.photo.width(), input.photo.height());

@@ -31,6 +31,7 @@ mod service_table;
 mod services;
 mod settings;
 mod trust;
+mod user_file;
 
 pub use crashes::CrashLog;
 pub use error::{PluginError, Refusal, Stage};
@@ -45,3 +46,4 @@ pub use registry::{Registry, SkippedFile};
 pub use segmenter::Segmenter;
 pub use services::{Listener, ServiceError, Services, class_slots};
 pub use settings::{Assignment, Setting, Settings, SettingsError, SettingsSchema, ValueType};
+pub use user_file::{edit_lines, read_lines};

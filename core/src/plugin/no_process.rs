@@ -1,5 +1,6 @@
 //! What stands for plugins in processes where the system has no memory file that nobody can cut.
 
+use super::crashes::CrashLog;
 use super::declaration::Declared;
 use super::error::{PluginError, Refusal, Stage};
 use super::info::Digest;
@@ -42,7 +43,7 @@ impl Program {
         (path, _): (&Path, Fingerprint),
         _: Declared,
         _: Digest,
-        _: Arc<Isolation>,
+        _: (Arc<Isolation>, Option<CrashLog>),
     ) -> Result<(Self, SettingsSchema), PluginError> {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let reason = "plugins run in a process of their own on Linux alone".to_owned();
@@ -76,7 +77,13 @@ impl Apart {
         match *self {}
     }
 
-    pub(super) fn scores(&mut self, _: &LabelImage, _: usize, _: &mut MakeView<'_>) -> Result<Vec<f64>, PluginError> {
+    pub(super) fn scores(
+        &mut self,
+        _: &LabelImage,
+        _: usize,
+        _: &mut MakeView<'_>,
+        _: &dyn Fn() -> bool,
+    ) -> Result<Vec<f64>, PluginError> {
         match *self {}
     }
 

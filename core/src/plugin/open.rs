@@ -1,6 +1,7 @@
 //! A plugin whose code may run: opened once, never closed.
 #![allow(unsafe_code)]
 
+use super::crashes::CrashLog;
 use super::declaration::{Declared, Fault, header_bytes, read_builtin};
 use super::error::{PluginError, Refusal, Stage};
 use super::info::{Digest, Kind, PluginInfo};
@@ -53,15 +54,21 @@ unsafe impl Send for Loaded {}
 unsafe impl Sync for Loaded {}
 
 impl Plugin {
-    /// A plugin that is linked into this program.
+    /// A plugin that is linked into this program, whose digest knows nothing of the code.
     pub fn builtin(declaration: &'static Declaration) -> Result<Self, PluginError> {
+        Self::of_program(declaration, None)
+    }
+
+    /// A plugin that is linked into the program with this digest.
+    pub(super) fn of_program(declaration: &'static Declaration, program: Option<Digest>) -> Result<Self, PluginError> {
         let refused = |name: &str, (stage, reason, advice): Fault| -> PluginError {
             Refusal { name: name.to_owned(), path: None, stage, reason, advice }.into()
         };
         let declared = read_builtin(declaration).map_err(|fault| refused("a built-in plugin", fault))?;
         let (table, schema_text, schema) =
             enter(declaration, declared.kind).map_err(|fault| refused(&declared.name, fault))?;
-        let parts = [&declared.name, &declared.version, &declared.summary, &schema_text];
+        let program = program.map_or_else(String::new, |sha256| sha256.to_string());
+        let parts = [&declared.name, &declared.version, &declared.summary, &schema_text, &program];
         let sha256 = Digest::of(parts.map(|part| format!("{}\n{part}\n", part.len())).concat().as_bytes());
         Ok(Self::new(declared, sha256, None, Code::Here(table), schema_text, schema))
     }
@@ -78,9 +85,9 @@ impl Plugin {
         (path, fingerprint): (&Path, Fingerprint),
         declared: Declared,
         sha256: Digest,
-        isolation: Arc<Isolation>,
+        keeping: (Arc<Isolation>, Option<CrashLog>),
     ) -> Result<Self, PluginError> {
-        let (program, schema) = Program::load((path, fingerprint), declared.clone(), sha256, isolation)?;
+        let (program, schema) = Program::load((path, fingerprint), declared.clone(), sha256, keeping)?;
         let text = program.settings_schema().to_owned();
         Ok(Self::new(declared, sha256, Some(path), Code::Apart(Arc::new(program)), text, schema))
     }

@@ -1,5 +1,6 @@
 //! Which plugins there are: those built in, and those found in directories. Listing runs no code of a file.
 
+use super::crashes::CrashLog;
 use super::declaration::{Declared, Fault, read_library};
 use super::error::{PluginError, Refusal, Stage};
 use super::executable::{is_named_executable, read_executable};
@@ -26,6 +27,8 @@ pub struct Registry {
     directories: Vec<PathBuf>,
     allowed: HashSet<Digest>,
     isolation: Option<Arc<Isolation>>,
+    crashes: Option<CrashLog>,
+    program: Option<Digest>,
 }
 
 /// A file that will not be loaded.
@@ -50,9 +53,19 @@ impl Registry {
         self.isolation = Some(Arc::new(isolation));
     }
 
+    /// Counts crashes in `log`, and refuses files that crashed too often, however they are run.
+    pub fn count_crashes(&mut self, log: CrashLog) {
+        self.crashes = Some(log);
+    }
+
+    /// Makes the digest of every plugin that is added to this program depend on the program's own.
+    pub fn of_program(&mut self, sha256: Digest) {
+        self.program = Some(sha256);
+    }
+
     /// Adds a plugin that is linked into this program.
     pub fn add_builtin(&mut self, declaration: &'static Declaration) -> Result<(), PluginError> {
-        let plugin = Plugin::builtin(declaration)?;
+        let plugin = Plugin::of_program(declaration, self.program)?;
         let name = plugin.info().name.clone();
         if self.builtins.contains_key(&name) {
             let reason = "another built-in plugin has this name".to_owned();
@@ -89,8 +102,7 @@ impl Registry {
             Err(fault) => return self.skip(path, name, fault),
         };
         let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
-        let quarantine = self.isolation.as_ref().and_then(|isolation| isolation.crashes.as_ref());
-        if let Some(Err(fault)) = quarantine.map(|log| log.check(info.sha256)) {
+        if let Err(fault) = self.check_crashes(info.sha256) {
             return self.skip(path, name, fault);
         }
         let first = match (self.builtins.contains_key(&info.name), self.found.get(&info.name)) {
@@ -105,6 +117,19 @@ impl Registry {
         };
         let reason = format!("a plugin called {} is already there, {first}", info.name);
         self.skip(path, None, (Stage::File, reason, "remove one of the two".to_owned()));
+    }
+
+    /// Takes the file at `path` for the plugin of its name, whatever other file was found for it.
+    pub fn prefer(&mut self, path: &Path) -> Result<(), PluginError> {
+        let candidate = examine(path, &self.allowed).1.map_err(|fault| refusal(path, fault))?;
+        let info = PluginInfo { is_apart: self.isolation.is_some(), ..candidate.info() };
+        self.check_crashes(info.sha256).map_err(|fault| refusal(path, fault))?;
+        self.found.insert(info.name.clone(), info);
+        Ok(())
+    }
+
+    fn check_crashes(&self, sha256: Digest) -> Result<(), Fault> {
+        self.crashes.as_ref().map_or(Ok(()), |log| log.check(sha256))
     }
 
     fn skip(&mut self, path: &Path, name: Option<String>, fault: Fault) {
@@ -144,18 +169,18 @@ impl Registry {
         Err(PluginError::Unknown { name: name.to_owned(), known })
     }
 
-    /// Whether the file at `path` is a program that speaks the wire, and no library; runs none of its code.
-    pub fn is_executable(path: &Path) -> bool {
-        read(path).and_then(|(path, bytes)| read_declaration(&path, &bytes)).is_ok_and(|found| found.is_executable())
+    /// What the file at `path` says of itself, whether or not it may be loaded; runs no code of it.
+    pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
+        let (real, bytes) = read(path).map_err(|fault| refusal(path, fault))?;
+        Self::inspect_bytes(&real, &bytes).map(|(info, _)| info)
     }
 
-    /// What the library at `path` says of itself, whether or not it may be loaded; runs no code of it.
-    pub fn inspect(path: &Path) -> Result<PluginInfo, PluginError> {
-        let found = read(path).and_then(|(path, bytes)| {
-            let declared = read_declaration(&path, &bytes)?;
-            Ok(Candidate { path, sha256: Digest::of(&bytes), declared }.info())
-        });
-        found.map_err(|fault| refusal(path, fault).into())
+    /// What `bytes`, read from `path`, say of themselves, and whether they are a program that speaks the wire.
+    pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<(PluginInfo, bool), PluginError> {
+        let declared = read_declaration(path, bytes).map_err(|fault| refusal(path, fault))?;
+        let is_executable = declared.is_executable();
+        let candidate = Candidate { path: path.to_owned(), sha256: Digest::of(bytes), declared };
+        Ok((candidate.info(), is_executable))
     }
 
     /// Refuses a file or directory that others may write, or replace.
@@ -168,8 +193,12 @@ impl Registry {
         let refused = |fault| PluginError::from(refusal(path, fault));
         let fingerprint = fingerprint(path).map_err(refused)?;
         let Candidate { path: real, sha256, declared } = examine(path, &self.allowed).1.map_err(refused)?;
+        self.check_crashes(sha256).map_err(refused)?;
         match &self.isolation {
-            Some(isolation) => Plugin::apart((&real, fingerprint), declared, sha256, Arc::clone(isolation)),
+            Some(isolation) => {
+                let keeping = (Arc::clone(isolation), self.crashes.clone());
+                Plugin::apart((&real, fingerprint), declared, sha256, keeping)
+            }
             None if declared.is_executable() => {
                 let advice = "leave out --in-process".to_owned();
                 Err(refused((Stage::Symbol, "an executable runs in a process of its own alone".to_owned(), advice)))

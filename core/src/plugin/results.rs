@@ -126,8 +126,8 @@ unsafe extern "C" fn take_proposal(context: *mut c_void, proposal: *const abi::P
             return violation(format!("proposal[{index}]"), &"null", format!("at most {MOST_RESULTS} proposals"));
         };
         // SAFETY: what the proposal points to is lent with it, as the header asks.
-        let proposal = unsafe { read_proposal(index, &proposal) }?;
-        rules.proposal(index, &proposal)?;
+        let mut proposal = unsafe { read_proposal(index, &proposal) }?;
+        rules.proposal(index, &mut proposal)?;
         collected.proposals.push(proposal);
         Ok(())
     })

@@ -3,7 +3,8 @@
 
 use super::lend::{self, read_growing, slice, slice_mut};
 use super::services::{
-    ServiceError, Services, class_slots, finite, finite_points, finite_poses, some_columns, some_stride,
+    SERVICE_PANICKED, ServiceError, Services, class_slots, finite, finite_points, finite_poses, some_columns,
+    some_stride,
 };
 use resurvey_schema::abi::{
     self, ErrorText, FeatureReceiver, Growing, STATUS_FAILED, STATUS_OK, Status, Task, Text, ViewReceiver,
@@ -69,7 +70,7 @@ unsafe fn serve(context: *mut c_void, error: *mut ErrorText, body: impl FnOnce(&
     let text = match catch_unwind(AssertUnwindSafe(|| body(table))) {
         Ok(Ok(())) => return STATUS_OK,
         Ok(Err(ServiceError(text))) => text,
-        Err(_) => "the host has a bug: its service panicked".to_owned(),
+        Err(_) => SERVICE_PANICKED.to_owned(),
     };
     // SAFETY: the caller's promise.
     unsafe { write_error(error, &text) };

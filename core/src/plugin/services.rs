@@ -96,6 +96,9 @@ pub trait Listener: Sync {
     fn cancelled(&self) -> bool;
 }
 
+/// What a plugin is told when a service panics, which must not cross the line.
+pub(super) const SERVICE_PANICKED: &str = "the host has a bug: its service panicked";
+
 /// Counts per view in the comparisons: one more than the highest class index of `classes`.
 pub fn class_slots(classes: &ClassTable) -> usize {
     classes.iter().map(|class| usize::from(class.index.0) + 1).max().unwrap_or(0)

@@ -10,9 +10,10 @@ use super::looked_at::{insert_looked_at, looked_at_since};
 use super::map_file::{MapFile, WriteFault};
 use super::migrate::format_of;
 use super::observations::Evidence;
-use super::plan::{check_new_classes, check_request, check_states, plan};
+use super::plan::{check_new_classes, check_numbers, check_request, check_states, plan};
 use super::rows::{VersionRow, classes_at, head, insert_classes};
 use super::seal;
+use super::states::last_state;
 use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
@@ -81,8 +82,10 @@ pub(super) fn make_version(
     check(connection, transaction, head.version)?;
     let live = live_rows(connection, &transaction.deltas)?;
     check_conflicts(connection, transaction, &live, head.version)?;
+    let last_fid = last_fid(connection)?;
+    check_numbers(transaction, last_fid, |fid| -> Result<_, Refused> { Ok(last_state(connection, fid)?) })?;
     let state = |fid: Fid| live.get(&fid).map(|row| row.state.clone());
-    let plan = plan(transaction, state, last_fid(connection)?, &head, (evidence, now))?;
+    let plan = plan(transaction, state, last_fid, &head, (evidence, now))?;
     let request = transaction.request.filter(|_| transaction.idempotency_key.is_some());
     VersionRow::insert(connection, &plan.record, request)?;
     if let Some(classes) = &transaction.classes {

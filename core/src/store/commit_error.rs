@@ -3,6 +3,9 @@
 use super::error::StoreError;
 use crate::version::{Digest, FeatureState, Fid, InvalidState, VersionId, VersionKind};
 
+/// An addition may leave so many numbers out. Versions stay for ever, so the highest number would end all additions.
+pub(super) const FID_STEP: u64 = 1 << 32;
+
 /// Why a transaction was not committed; the map is as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -76,6 +79,29 @@ pub enum CommitError {
     FidRange {
         /// The number.
         fid: Fid,
+    },
+    /// A number so far above the others that it would use them up.
+    #[error(
+        "feature number {fid} is too far above {last}, the highest in the map; expected at most {}, or no number: the map \
+         gives the next", last.0.saturating_add(FID_STEP)
+    )]
+    FidAhead {
+        /// The number.
+        fid: Fid,
+        /// The highest that a feature has or had.
+        last: Fid,
+    },
+    /// A number that was another thing's.
+    #[error(
+        "feature {fid} was {was} when it went and cannot come back as {found}; leave out the number to add another"
+    )]
+    FidOfAnother {
+        /// The number.
+        fid: Fid,
+        /// What it was.
+        was: String,
+        /// What is added under it.
+        found: String,
     },
     /// A state that cannot be in a map.
     #[error("{feature}: {error}")]

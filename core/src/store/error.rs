@@ -1,6 +1,6 @@
 //! What can be wrong with a map file or a question to it.
 
-use crate::version::{Digest, Fid, InvalidRevision, VersionId};
+use crate::version::{Digest, Fid, InvalidRevision, VersionId, parse_moment};
 use jiff::Timestamp;
 use rusqlite::{ErrorCode, ffi};
 use std::path::{Path, PathBuf};
@@ -106,7 +106,7 @@ pub enum StoreError {
         next: VersionId,
     },
     /// Not in the map at that version.
-    #[error("no feature {fid} at version {version}")]
+    #[error("no feature {fid} at version {version}; \"resurvey log MAP {fid}\" lists the versions that changed it")]
     NoSuchFeature {
         /// What was asked for.
         fid: Fid,
@@ -114,13 +114,13 @@ pub enum StoreError {
         version: VersionId,
     },
     /// Not in the map at any version.
-    #[error("no feature {fid} at any version")]
+    #[error("no feature {fid} at any version; \"resurvey query MAP\" lists the features of the newest")]
     NeverAFeature {
         /// What was asked for.
         fid: Fid,
     },
     /// A name nobody gave.
-    #[error("no tag {name:?} in the map")]
+    #[error("no tag {name:?} in the map; {}", instead_of_tag(name))]
     NoSuchTag {
         /// What was asked for.
         name: String,
@@ -169,13 +169,13 @@ pub enum StoreError {
         digest: Digest,
     },
     /// No such proposal.
-    #[error("no proposal {id}")]
+    #[error("no proposal {id}; \"resurvey proposals MAP list --all\" lists them")]
     NoSuchProposal {
         /// What was asked for.
         id: u64,
     },
     /// The proposal was decided before.
-    #[error("proposal {id} is {status} already")]
+    #[error("proposal {id} is {status} already; \"resurvey proposals MAP show {id}\" says by whom and why")]
     ProposalDecided {
         /// The proposal.
         id: u64,
@@ -190,6 +190,14 @@ pub enum StoreError {
         /// What SQLite said.
         detail: String,
     },
+}
+
+/// What was meant, perhaps, by a name that nobody gave.
+fn instead_of_tag(name: &str) -> String {
+    match parse_moment(name) {
+        Ok(_) => format!("a date or time is written @{name}"),
+        Err(_) => "\"resurvey tag MAP\" lists the tags".to_owned(),
+    }
 }
 
 /// What goes wrong inside the store, before the path is known.
@@ -230,7 +238,9 @@ fn sql_error(error: &rusqlite::Error, path: PathBuf) -> StoreError {
         rusqlite::Error::SqliteFailure(failure, _) => match failure.code {
             ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { path },
             ErrorCode::DatabaseCorrupt => StoreError::Damaged { path, detail },
-            ErrorCode::NotADatabase => StoreError::NotAMap { path, found: "no SQLite database".to_owned() },
+            ErrorCode::NotADatabase => {
+                StoreError::NotAMap { path, found: "another kind of file, or one that lost its header".to_owned() }
+            }
             ErrorCode::ReadOnly => StoreError::ReadOnly { path },
             ErrorCode::DiskFull => StoreError::Full { path },
             ErrorCode::CannotOpen => {

@@ -66,6 +66,7 @@ impl MapFile {
 
     /// Gives the space of what was removed back to the disk: SQLite writes the whole file anew.
     pub fn compact(&self) -> Result<(), StoreError> {
+        let _turn = self.take_turn()?;
         self.outside(|connection| {
             Ok(connection.execute_batch(
                 "PRAGMA cache_spill = 1; VACUUM; PRAGMA cache_spill = 0; PRAGMA wal_checkpoint(TRUNCATE)",

@@ -4,17 +4,18 @@ use super::beside::Beside;
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::migrate::migrate;
-use super::rows::{VersionRow, check_classes, insert_classes};
+use super::on_disk::{has_write_ahead_log, immutable_uri, inspect, is_marked_read_only, unless_cut};
+use super::rows::{VersionRow, check_classes, head, insert_classes};
 use super::seal;
+use super::turn::{Turn, Turns};
 use crate::version::{Counts, Frame, Operations, VersionId, VersionKind, VersionRecord, version_hash};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
 use resurvey_schema::sql::{APPLICATION_ID, MIGRATIONS};
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, named_params};
-use std::cell::Cell;
-use std::fs::{self, File, OpenOptions};
-use std::io::Read;
+use std::cell::{Cell, OnceCell};
+use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -32,6 +33,9 @@ pub struct MapFile {
     pub(super) path: PathBuf,
     writable: bool,
     beside: Cell<Beside>,
+    /// Of a map that is open to write and has a write-ahead log.
+    turns: OnceCell<Turns>,
+    patience: Cell<Duration>,
 }
 
 /// What a new map is made of.
@@ -76,7 +80,7 @@ impl MapFile {
         let made = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
             .map_err(|fault| fault.at(path))
             .and_then(|map| map.transact(|connection| fill(connection, new, now)).map(|()| map))
-            .and_then(|map| map.use_write_ahead_log().map(|()| map));
+            .and_then(|map| map.begin_write_ahead_log().map(|()| map));
         if made.is_err() {
             // The file is ours: create_new made it. Nothing of use is in it.
             let _ = fs::remove_file(path);
@@ -90,11 +94,14 @@ impl MapFile {
         if is_marked_read_only(path) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
-        let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path))?;
+        let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path));
+        let map = unless_cut(path, map)?;
         map.beside.set(Beside::for_format(map.check_format()? as usize));
         if map.connection.is_readonly(rusqlite::MAIN_DB).unwrap_or(true) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
+        // What keeps the file from being read is said here.
+        map.read(head)?;
         Ok(map)
     }
 
@@ -108,7 +115,7 @@ impl MapFile {
             } else {
                 Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
             };
-            let map = map.map_err(|fault| fault.at(path))?;
+            let map = unless_cut(path, map.map_err(|fault| fault.at(path)))?;
             map.beside.set(Beside::for_format(map.check_format()? as usize));
             // What keeps the file from being read is said here.
             map.read(|_| Ok(()))?;
@@ -129,6 +136,7 @@ impl MapFile {
 
     /// Waits this long for another writer instead of five seconds.
     pub fn set_busy_timeout(&self, timeout: Duration) -> Result<(), StoreError> {
+        self.patience.set(timeout);
         self.connection.busy_timeout(timeout).map_err(|error| Fault::Sql(error).at(&self.path))
     }
 
@@ -172,8 +180,13 @@ impl MapFile {
         work(&self.connection).map_err(|fault| fault.at(&self.path))
     }
 
-    /// Runs `work` on the map in the newest format, in one immediate transaction: all of it or nothing. Until something is
-    /// written the file keeps every byte.
+    /// Runs `work`, in which reads and writes are one transaction: all of it or nothing, and nobody else writes meanwhile.
+    pub fn together<T, E: From<StoreError>>(&self, work: impl FnOnce(&Self) -> Result<T, E>) -> Result<T, E> {
+        self.write(|_| work(self).map_err(WriteFault::Refused))
+    }
+
+    /// Runs `work` on the map in the newest format, in one immediate transaction or as a part of the one that is under way:
+    /// all of it or nothing. Until something is written the file keeps every byte.
     pub(super) fn write<T, E: From<StoreError>>(
         &self,
         work: impl FnOnce(&Connection) -> Result<T, WriteFault<E>>,
@@ -181,15 +194,29 @@ impl MapFile {
         if !self.writable {
             return Err(StoreError::ReadOnly { path: self.path.clone() }.into());
         }
+        if !self.connection.is_autocommit() {
+            return self.part(work);
+        }
         let done = self.transact(|connection| {
             self.bring_up_to_date(connection).map_err(|error| WriteFault::Refused(error.into()))?;
             work(connection)
         })?;
         self.beside.set(Beside::NotNeeded);
-        // A copy that another program made may have another journal. What is written is safe in that too, and readers
-        // do not wait for the next.
-        let _ = self.use_write_ahead_log();
+        if self.turns.get().is_none() {
+            // A copy that another program made may have another journal. What is written is safe in that too, and readers
+            // do not wait for the next.
+            let _ = self.begin_write_ahead_log();
+        }
         Ok(done)
+    }
+
+    /// Runs `work` as a part of the transaction that is under way.
+    fn part<T, E: From<StoreError>>(&self, work: impl FnOnce(&Connection) -> Result<T, WriteFault<E>>) -> Result<T, E> {
+        let run = |sql: &str| self.connection.execute_batch(sql).map_err(|error| Fault::Sql(error).at(&self.path));
+        run("SAVEPOINT part")?;
+        let done = work(&self.connection);
+        run(if done.is_ok() { "RELEASE part" } else { "ROLLBACK TO part; RELEASE part" })?;
+        done.map_err(|fault| fault.at(&self.path))
     }
 
     /// Migrates a map of an older format; refuses one that a newer program has migrated since it was opened.
@@ -203,7 +230,7 @@ impl MapFile {
         migrated.map_err(|fault| fault.at(&self.path))
     }
 
-    /// Runs `work` in one immediate transaction.
+    /// Runs `work` in one immediate transaction, when it is this writer's turn.
     ///
     /// Immediate, because a reading transaction that wants to write later is refused at once when another writer was
     /// faster, whatever the busy timeout.
@@ -211,13 +238,31 @@ impl MapFile {
         &self,
         work: impl FnOnce(&Connection) -> Result<T, WriteFault<E>>,
     ) -> Result<T, E> {
-        let at = |fault: Fault| E::from(fault.at(&self.path));
-        let begin = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
-        let transaction = begin.map_err(|error| at(error.into()))?;
-        match work(&transaction) {
-            Ok(value) => transaction.commit().map(|()| value).map_err(|error| at(error.into())),
-            Err(WriteFault::Fault(fault)) => Err(at(fault)),
-            Err(WriteFault::Refused(error)) => Err(error),
+        let at = |error: rusqlite::Error| E::from(Fault::Sql(error).at(&self.path));
+        let (_turn, transaction) = loop {
+            let turn = self.take_turn()?;
+            let begin = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
+            let transaction = begin.map_err(at)?;
+            // Another writer may have begun a log since.
+            if turn.is_some() || !self.has_log()? {
+                break (turn, transaction);
+            }
+        };
+        let value = work(&transaction).map_err(|fault| fault.at(&self.path))?;
+        transaction.commit().map(|()| value).map_err(at)
+    }
+
+    /// Waits until no other writer is under way; a map without a write-ahead log has none.
+    pub(super) fn take_turn(&self) -> Result<Option<Turn<'_>>, StoreError> {
+        if self.turns.get().is_none() && self.writable && self.read(head).is_ok() && self.has_log()? {
+            self.find_turns()?;
+        }
+        let Some(turns) = self.turns.get() else { return Ok(None) };
+        let path = || self.path.clone();
+        match turns.take(self.patience.get()) {
+            Ok(Some(turn)) => Ok(Some(turn)),
+            Ok(None) => Err(StoreError::Busy { path: path() }),
+            Err(error) => Err(StoreError::Io { path: path(), detail: format!("its log cannot be locked: {error}") }),
         }
     }
 
@@ -230,7 +275,8 @@ impl MapFile {
     }
 
     fn connect_to(path: &Path, target: impl AsRef<Path>, flags: OpenFlags) -> Result<Self, Fault> {
-        let connection = Connection::open_with_flags(target, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        let connection = Connection::open_with_flags(target, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)
+            .map_err(|error| StoreError::Io { path: path.to_owned(), detail: error.to_string() })?;
         connection.busy_timeout(BUSY_TIMEOUT)?;
         connection.set_prepared_statement_cache_capacity(64);
         connection.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
@@ -248,20 +294,47 @@ impl MapFile {
         connection.pragma_update(None, "synchronous", "FULL")?;
         connection.pragma_update(None, "temp_store", "MEMORY")?;
         let writable = flags.contains(OpenFlags::SQLITE_OPEN_READ_WRITE);
-        Ok(Self { connection, path: path.to_owned(), writable, beside: Cell::new(Beside::NotNeeded) })
+        Ok(Self {
+            connection,
+            path: path.to_owned(),
+            writable,
+            beside: Cell::new(Beside::NotNeeded),
+            turns: OnceCell::new(),
+            patience: Cell::new(BUSY_TIMEOUT),
+        })
     }
 
-    fn use_write_ahead_log(&self) -> Result<(), StoreError> {
+    fn begin_write_ahead_log(&self) -> Result<(), StoreError> {
         let set = |connection: &Connection| -> Result<String, Fault> {
             Ok(connection.pragma_update_and_check(None, "journal_mode", "WAL", |row| row.get(0))?)
         };
         match self.outside(set)?.as_str() {
-            "wal" => Ok(()),
+            "wal" => {
+                // The first read opens the log.
+                self.read(head)?;
+                if cfg!(unix) { self.find_turns() } else { Ok(()) }
+            }
             mode => Err(StoreError::NoWriteAheadLog {
                 path: self.path.clone(),
                 detail: format!("the file system allows only journal mode {mode:?}"),
             }),
         }
+    }
+
+    /// Whether the map has a write-ahead log, as its last transaction found it.
+    fn has_log(&self) -> Result<bool, StoreError> {
+        self.outside(|connection| {
+            let mode: String = connection.pragma_query_value(None, "journal_mode", |row| row.get(0))?;
+            // A locked file of Windows cannot be read by others.
+            Ok(cfg!(unix) && mode == "wal")
+        })
+    }
+
+    fn find_turns(&self) -> Result<(), StoreError> {
+        let turns = Turns::of(&self.path).map_err(|fault| fault.at(&self.path))?;
+        // It is set once; the lock is the same in both.
+        let _ = self.turns.set(turns);
+        Ok(())
     }
 
     /// The number of the format, when this program can read it.
@@ -286,6 +359,15 @@ impl MapFile {
 pub(super) enum WriteFault<E> {
     Fault(Fault),
     Refused(E),
+}
+
+impl<E: From<StoreError>> WriteFault<E> {
+    fn at(self, path: &Path) -> E {
+        match self {
+            Self::Fault(fault) => fault.at(path).into(),
+            Self::Refused(error) => error,
+        }
+    }
 }
 
 impl<E, F: Into<Fault>> From<F> for WriteFault<E> {
@@ -338,62 +420,4 @@ pub(super) fn first_version(new: &NewMap, now: Timestamp) -> VersionRecord {
         evidence: None,
         hash: version_hash(None, operations, None),
     }
-}
-
-/// Refuses what is plainly not a map before SQLite sees it.
-fn inspect(path: &Path) -> Result<(), StoreError> {
-    const MAGIC: &[u8] = b"SQLite format 3\0";
-    const HEADER_BYTES: u64 = 100;
-    let not_a_map = |found: &str| StoreError::NotAMap { path: path.to_owned(), found: found.to_owned() };
-    let metadata = fs::metadata(path).map_err(|error| io_error(path, &error))?;
-    if !metadata.is_file() {
-        return Err(not_a_map("a directory or device"));
-    }
-    if metadata.len() == 0 {
-        return Err(not_a_map("an empty file"));
-    }
-    let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
-    read.map_err(|error| io_error(path, &error))?;
-    if !start.starts_with(MAGIC) {
-        return Err(not_a_map("another kind of file"));
-    }
-    // A crash while the log is written back may leave part of a page, which the log then mends.
-    let page_bytes = start.get(16..18).map_or(0, |size| u64::from(u16::from_be_bytes([size[0], size[1]])));
-    let is_cut = page_bytes > 1 && metadata.len() % page_bytes != 0 && !has_write_ahead_log(path);
-    if metadata.len() < HEADER_BYTES || is_cut {
-        let detail = format!("it ends after {} bytes", metadata.len());
-        return Err(StoreError::Damaged { path: path.to_owned(), detail });
-    }
-    Ok(())
-}
-
-fn io_error(path: &Path, error: &std::io::Error) -> StoreError {
-    match error.kind() {
-        std::io::ErrorKind::NotFound => StoreError::NotFound { path: path.to_owned() },
-        _ => StoreError::Io { path: path.to_owned(), detail: error.to_string() },
-    }
-}
-
-/// Whether the marks on the file forbid writing, also to a user who could write all the same.
-fn is_marked_read_only(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|metadata| metadata.permissions().readonly())
-}
-
-fn has_write_ahead_log(path: &Path) -> bool {
-    let mut log = path.as_os_str().to_owned();
-    log.push("-wal");
-    fs::metadata(log).is_ok_and(|metadata| metadata.len() > 0)
-}
-
-/// A URI that tells SQLite that nobody writes to the file.
-fn immutable_uri(path: &Path) -> String {
-    let mut uri = "file:".to_owned();
-    for character in path.to_string_lossy().chars() {
-        match character {
-            '%' | '?' | '#' => uri += &format!("%{:02X}", character as u32),
-            _ => uri.push(character),
-        }
-    }
-    uri + "?immutable=1"
 }

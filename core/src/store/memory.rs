@@ -6,7 +6,8 @@ use super::interface::{History, Made};
 use super::map_file::{NewMap, first_version};
 use super::observations::evidence_digest;
 use super::plan::{
-    check_digests, check_new_classes, check_request, check_states, needed_geometry, plan, starts_from, touched,
+    check_digests, check_new_classes, check_numbers, check_request, check_states, needed_geometry, plan, starts_from,
+    touched, whole_microseconds,
 };
 use super::revisions::check_tag_name;
 use super::rows::check_classes;
@@ -49,7 +50,7 @@ impl MemoryMap {
     /// A map with version 0, which holds nothing.
     pub fn new(new: &NewMap, now: Timestamp) -> Result<Self, StoreError> {
         check_classes(&new.classes)?;
-        let record = first_version(new, now);
+        let record = first_version(new, whole_microseconds(now));
         let first = Kept { record, deltas: Vec::new(), classes: new.classes.clone(), looked_at: None, request: None };
         let contents = Contents { versions: vec![first], geometries: BTreeMap::new(), tags: BTreeMap::new() };
         Ok(Self(RefCell::new(contents)))
@@ -144,6 +145,9 @@ impl Contents {
         }
         check_digests(transaction)?;
         let last_fid = self.deltas_until(head.record.version).map(|(_, delta)| delta.fid()).max().unwrap_or(Fid(0));
+        let past =
+            |fid| Ok::<_, CommitError>(self.lives().into_iter().rfind(|life| life.fid == fid).map(|life| life.state));
+        check_numbers(transaction, last_fid, past)?;
         let evidence = transaction.evidence.as_ref().map(evidence_digest).transpose()?;
         let plan = plan(transaction, |fid| live.get(&fid).cloned(), last_fid, &head.record, (evidence, now))?;
         let version = plan.record.version;

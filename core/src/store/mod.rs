@@ -26,6 +26,7 @@ mod memory;
 mod migrate;
 mod observations;
 mod observed;
+mod on_disk;
 mod operations;
 mod plan;
 mod proposals;
@@ -38,6 +39,7 @@ mod snapshot;
 mod states;
 #[cfg(test)]
 mod tests;
+mod turn;
 
 pub use commit_error::{CommitError, ConflictingChange};
 pub use error::StoreError;

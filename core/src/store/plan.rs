@@ -1,6 +1,6 @@
 //! What a transaction comes to, worked out and checked before anything is written: the same for every backend.
 
-use super::commit_error::CommitError;
+use super::commit_error::{CommitError, FID_STEP};
 use super::error::StoreError;
 use super::rows::check_classes;
 use crate::version::{
@@ -101,6 +101,39 @@ pub(super) fn starts_from(delta: &Delta, live: Option<&FeatureState>) -> bool {
     }
 }
 
+/// Refuses additions under numbers that are far above `last_fid`, or were another thing's; `past` is what a feature that is
+/// gone was last. An undo brings back what was there.
+pub(super) fn check_numbers<E: From<CommitError>>(
+    transaction: &UpdateTransaction,
+    last_fid: Fid,
+    past: impl Fn(Fid) -> Result<Option<FeatureState>, E>,
+) -> Result<(), E> {
+    for delta in transaction.deltas.iter().filter(|delta| delta.before().is_none()) {
+        let fid = delta.fid();
+        if fid.0 > last_fid.0.saturating_add(FID_STEP) {
+            return Err(CommitError::FidAhead { fid, last: last_fid }.into());
+        }
+        if fid > last_fid || transaction.kind == VersionKind::Revert {
+            continue;
+        }
+        let (was, found) = (past(fid)?.as_ref().map(thing), delta.after().map(thing));
+        if let (Some(was), Some(found)) = (was, found)
+            && was != found
+        {
+            return Err(CommitError::FidOfAnother { fid, was, found }.into());
+        }
+    }
+    Ok(())
+}
+
+/// What a feature is through all its states.
+fn thing(state: &FeatureState) -> String {
+    match state.class() {
+        Some(class) => format!("a {} descriptor of class {}", state.kind_name(), class.0),
+        None => format!("an {}", state.kind_name()),
+    }
+}
+
 /// Boxes of everything that the transaction changes, before and after. A state without a box is refused by
 /// [`check_states`], by name.
 pub(super) fn touched(transaction: &UpdateTransaction) -> Vec<BoxMm> {
@@ -124,8 +157,8 @@ pub(super) fn plan(
     let record = VersionRecord {
         version: VersionId(head.version.0 + 1),
         kind: transaction.kind,
-        committed_at: now.max(head.committed_at),
-        observed_at: transaction.observed_at,
+        committed_at: whole_microseconds(now).max(head.committed_at),
+        observed_at: transaction.observed_at.map(whole_microseconds),
         author: transaction.author.clone(),
         message: transaction.message.clone(),
         base: Some(transaction.base),
@@ -137,6 +170,11 @@ pub(super) fn plan(
         hash: version_hash(Some(head.hash), operations.finish(), evidence),
     };
     Ok(Plan { record, deltas, boxes })
+}
+
+/// Times of a map are whole microseconds.
+pub(super) fn whole_microseconds(time: Timestamp) -> Timestamp {
+    Timestamp::from_microsecond(time.as_microsecond()).unwrap_or(time)
 }
 
 fn numbered(

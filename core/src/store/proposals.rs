@@ -3,6 +3,7 @@
 use super::commit::{make_unseen_version, make_version};
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
+use super::looked_at::insert_looked_at;
 use super::map_file::{MapFile, WriteFault};
 use super::observations::{Evidence, digest_of, link};
 use super::plan::{check_request, check_states};
@@ -136,6 +137,13 @@ impl MapFile {
         self.read(|connection| select(connection, &sql, &[]))
     }
 
+    /// Those that nobody decided, oldest first.
+    pub fn open_proposals(&self) -> Result<Vec<Proposal>, StoreError> {
+        // The literal condition makes the partial index usable.
+        let sql = format!("SELECT {COLUMNS} FROM proposal WHERE status = 'open' ORDER BY id");
+        self.read(|connection| select(connection, &sql, &[]))
+    }
+
     /// The proposal numbered `id`.
     pub fn proposal(&self, id: u64) -> Result<Proposal, StoreError> {
         self.read(|connection| one(connection, id))
@@ -147,9 +155,10 @@ impl MapFile {
         self.write(|connection| -> Result<VersionId, WriteFault<CommitError>> {
             let proposal = open_one(connection, id)?;
             let mut transaction = proposal.transaction;
-            transaction.viewed_region = None;
+            let viewed_region = transaction.viewed_region.take();
             let evidence = proposal.observation.map(|id| digest_of(connection, id)).transpose()?;
             let record = make_version(connection, &transaction, evidence, now)?;
+            insert_looked_at(connection, record.version, viewed_region.as_ref())?;
             if let Some(observation) = proposal.observation {
                 link(connection, observation, record.version)?;
             }

@@ -2,7 +2,7 @@
 
 use super::error::{Fault, StoreError};
 use super::rows::{FEATURE_COLUMNS, feature, head};
-use crate::version::{Digest, Feature, Fid, VersionId};
+use crate::version::{Digest, Feature, FeatureState, Fid, VersionId};
 use rusqlite::{Connection, OptionalExtension, ToSql, named_params};
 
 /// The bytes of the geometry that `digest` names.
@@ -43,6 +43,14 @@ pub(super) fn lives(connection: &Connection, fid: Fid) -> Result<Vec<Feature>, F
     let sql = format!("SELECT {FEATURE_COLUMNS} FROM feature_version AS f WHERE f.fid = :fid ORDER BY f.from_version");
     let lives = features(connection, &sql, named_params! {":fid": fid.0 as i64})?;
     if lives.is_empty() { Err(StoreError::NeverAFeature { fid }.into()) } else { Ok(lives) }
+}
+
+/// What `fid` is, or was last; `None` when no version has it.
+pub(super) fn last_state(connection: &Connection, fid: Fid) -> Result<Option<FeatureState>, Fault> {
+    let sql = format!(
+        "SELECT {FEATURE_COLUMNS} FROM feature_version AS f WHERE f.fid = :fid ORDER BY f.from_version DESC LIMIT 1"
+    );
+    Ok(features(connection, &sql, named_params! {":fid": fid.0 as i64})?.pop().map(|feature| feature.state))
 }
 
 /// The features that `sql` selects as [`FEATURE_COLUMNS`].

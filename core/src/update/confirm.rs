@@ -5,7 +5,7 @@
 //! than their σ allow, that of the result grows by the Birge ratio (Birge, Phys. Rev. 40, 1932).
 
 use super::resolve::Change;
-use crate::store::{MapFile, Proposal, ProposalStatus, StoreError};
+use crate::store::{MapFile, Proposal, StoreError};
 use crate::version::{Digest, FeatureState, UpdateTransaction};
 use nalgebra::Vector3;
 use resurvey_schema::{Descriptor, DynamicDescriptor, GridPoint, MaterialDescriptor, Uncertainty};
@@ -25,8 +25,8 @@ const SAME_SURFACE_COS: f64 = 0.94;
 pub struct Testimony {
     /// Number of the proposal.
     pub proposal: u64,
-    /// Digest of the capture: captures with the same one are one.
-    pub capture: Digest,
+    /// Digest of the photo, or of the capture where that is not known: with the same one, it is one witness.
+    pub photo: Digest,
     /// Digest of the observation.
     pub observation: Digest,
     /// The change.
@@ -47,11 +47,11 @@ pub struct Confirmation {
 /// What open proposals with one change and an observation say, by number.
 pub fn testimonies(map: &MapFile) -> Result<Vec<Testimony>, StoreError> {
     let mut found = Vec::new();
-    for proposal in map.proposals()?.into_iter().rev().filter(|proposal| proposal.status == ProposalStatus::Open) {
+    for proposal in map.open_proposals()? {
         let Proposal { id, transaction, observation: Some(observation), .. } = proposal else { continue };
         let (Some(change), Some(recorded)) = (change_of(&transaction), map.observation(observation)?) else { continue };
-        let capture = recorded.observation.capture;
-        found.push(Testimony { proposal: id, capture, observation: recorded.digest, change });
+        let photo = recorded.observation.photo.unwrap_or(recorded.observation.capture);
+        found.push(Testimony { proposal: id, photo, observation: recorded.digest, change });
     }
     Ok(found)
 }
@@ -76,37 +76,51 @@ fn change_of(transaction: &UpdateTransaction) -> Option<Change> {
 }
 
 /// The change of `own` fused with those of `others` that agree with it and each other, when they come from at least
-/// `captures` different captures.
-pub fn confirm(own: &Testimony, others: &[Testimony], captures: usize) -> Option<Confirmation> {
-    // What the same capture says of something else is nearer to what others say of that.
-    let siblings = || others.iter().filter(|other| other.capture == own.capture && other.proposal != own.proposal);
+/// `photos` different photos.
+pub fn confirm(own: &Testimony, others: &[Testimony], photos: usize) -> Option<Confirmation> {
+    // What the same photo says of something else is nearer to what others say of that.
+    let siblings = || others.iter().filter(|other| other.photo == own.photo && other.proposal != own.proposal);
     let is_of_a_sibling = |other: &Testimony, off: f64| {
         siblings().filter_map(|sibling| disagreement(&sibling.change, &other.change)).any(|nearer| nearer < off)
     };
     let mut near: Vec<(f64, &Testimony)> = others
         .iter()
-        .filter(|other| other.capture != own.capture)
+        .filter(|other| other.photo != own.photo)
         .filter_map(|other| Some((disagreement(&own.change, &other.change)?, other)))
         .filter(|(off, other)| !is_of_a_sibling(other, *off))
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.proposal.cmp(&b.1.proposal)));
     let mut group = vec![own];
-    let mut seen = BTreeSet::from([own.capture]);
+    let mut seen = BTreeSet::from([own.photo]);
     for (_, other) in near {
         let agrees = group.iter().all(|member| disagreement(&member.change, &other.change).is_some());
-        if agrees && seen.insert(other.capture) {
+        if agrees && seen.insert(other.photo) {
             group.push(other);
         }
     }
-    if group.len() < captures.max(1) {
+    if group.len() < photos.max(1) {
         return None;
     }
-    let again = siblings().filter(|sibling| sibling.change == own.change);
+    let again = others.iter().filter(|other| group.iter().any(|member| is_repeated(member, other, others)));
     let mut proposals: Vec<u64> = group.iter().copied().chain(again).map(|member| member.proposal).collect();
     proposals.sort_unstable();
+    proposals.dedup();
     let changes: Vec<&Change> = group.iter().map(|member| &member.change).collect();
     let observations = group.iter().map(|member| member.observation).collect();
     Some(Confirmation { change: fused(&changes), proposals, observations })
+}
+
+/// Whether `other` says what `member` says, of the same photo: of all that the member's observation says it is nearest.
+fn is_repeated(member: &Testimony, other: &Testimony, all: &[Testimony]) -> bool {
+    if member.photo != other.photo || member.proposal == other.proposal {
+        return false;
+    }
+    let off = |said: &Testimony| disagreement(&said.change, &other.change);
+    let beside = |said: &&Testimony| said.observation == member.observation && said.proposal != member.proposal;
+    let Some(own) = off(member).filter(|_| member.observation != other.observation) else {
+        return member.change == other.change;
+    };
+    all.iter().filter(beside).filter_map(off).all(|nearer| nearer >= own)
 }
 
 /// How far two changes differ, in 1σ of their difference; `None` when they do not mean the same.

@@ -23,9 +23,9 @@ fn poster(west: f64, width: f64, sigma_m: f64) -> Descriptor {
     Descriptor::Material(MaterialDescriptor { sigma: sure(sigma_m, Some(sigma_m)), ..banner(west, 0.0, width, 3.0) })
 }
 
-fn says(proposal: u64, capture: &[u8], change: Change) -> Testimony {
-    let (capture, observation) = (Digest::of(capture), Digest::of(&proposal.to_le_bytes()));
-    Testimony { proposal, capture, observation, change }
+fn says(proposal: u64, photo: &[u8], change: Change) -> Testimony {
+    let (photo, observation) = (Digest::of(photo), Digest::of(&proposal.to_le_bytes()));
+    Testimony { proposal, photo, observation, change }
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn measurements_that_agree_better_than_they_need_are_surer_than_each() {
 }
 
 #[test]
-fn the_same_capture_twice_counts_once() {
+fn the_same_photo_twice_counts_once() {
     let own = says(3, b"a", Change::Add(chair(0.0, 0.1)));
     let others = [says(1, b"a", Change::Add(chair(0.0, 0.1)))];
     assert_eq!(confirm(&own, &others, 2), None);
@@ -132,4 +132,23 @@ proptest! {
         let (low, high) = (eastings().fold(f64::INFINITY, f64::min), eastings().fold(f64::NEG_INFINITY, f64::max));
         prop_assert!((low - 1e-9..=high + 1e-9).contains(&fused.anchor().easting_m));
     }
+}
+
+#[test]
+fn what_one_photo_says_in_two_captures_is_settled_once_and_each_thing_for_itself() {
+    // Two chairs 0.6 m apart, within three sigma of each other; photo a was sent twice, with another prior.
+    let beside = |proposal, photo: &[u8], seen: u64, east| Testimony {
+        observation: Digest::of(&seen.to_le_bytes()),
+        ..says(proposal, photo, Change::Add(chair(east, 0.2)))
+    };
+    let others = [
+        beside(1, b"a", 10, 0.0),
+        beside(2, b"a", 10, 0.6),
+        beside(3, b"a", 11, 0.01),
+        beside(4, b"a", 11, 0.61),
+        beside(6, b"b", 12, 0.62),
+    ];
+    let found = confirm(&beside(5, b"b", 12, 0.02), &others, 2).unwrap();
+    assert_eq!(found.proposals, [1, 3, 5]);
+    assert_eq!(confirm(&beside(5, b"a", 12, 0.02), &others[..4], 2), None);
 }

@@ -2,6 +2,7 @@
 
 mod compare;
 mod confirm;
+mod doubles;
 mod error;
 mod overlap;
 mod resolve;
@@ -10,6 +11,7 @@ mod transaction;
 
 pub use compare::{Comparison, pose_estimate};
 pub use confirm::{Confirmation, Testimony, confirm, testimonies};
+pub use doubles::refuse_doubles;
 pub use error::UpdateError;
 pub use resolve::{Change, Resolution, in_the_way, resolve};
 pub use surroundings::{REACH_M, world_around};

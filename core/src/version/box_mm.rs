@@ -15,7 +15,7 @@ pub struct BoxMm {
 #[non_exhaustive]
 pub enum InvalidBox {
     /// A coordinate that is not a number or is beyond any map.
-    #[error("{axis} {value_m} m is not within {} m of the origin", BoxMm::LIMIT_M)]
+    #[error("{axis} {} m is not within {} m of the origin", legible(*value_m), BoxMm::LIMIT_M)]
     OutOfRange {
         /// `easting`, `northing` or `height`.
         axis: &'static str,
@@ -35,6 +35,11 @@ pub enum InvalidBox {
     /// No point at all.
     #[error("expected at least one point, found none")]
     Empty,
+}
+
+/// A number in at most a line: 1e308 has three hundred digits.
+fn legible(value: f64) -> String {
+    if value.abs() < 1e15 { value.to_string() } else { format!("{value:e}") }
 }
 
 const AXES: [&str; 3] = ["easting", "northing", "height"];

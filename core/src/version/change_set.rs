@@ -6,8 +6,8 @@ use super::{
     descriptor_from_file, descriptor_to_file,
 };
 use jiff::Timestamp;
-use resurvey_schema::ClassTable;
 use resurvey_schema::changes::{ChangeLine, ChangeSetHeader, DescriptorFile, FORMAT, GeometryLine, ObjectFile, Op};
+use resurvey_schema::{ClassId, ClassTable};
 use std::collections::BTreeMap;
 
 /// A change set that was read and checked.
@@ -21,6 +21,12 @@ pub struct ChangeSet {
     pub message: Option<String>,
     /// When the world was so.
     pub observed_at: Option<Timestamp>,
+    /// The map it was made from.
+    pub map_id: Option<String>,
+    /// Hash of `base` there.
+    pub base_hash: Option<Digest>,
+    /// Names of the classes there, which the indices in `geometries` mean; empty when it does not say.
+    pub classes: BTreeMap<ClassId, String>,
     /// Features without a number.
     pub additions: Vec<FeatureState>,
     /// Changes of numbered features.
@@ -42,6 +48,9 @@ pub enum ChangeSetError {
     /// Not a time.
     #[error("line 1: observed_at: expected a time with its zone such as 2026-03-01T10:00:00+08:00, found {0:?}")]
     ObservedAt(String),
+    /// Not a hash.
+    #[error("line 1: base_hash: expected a SHA-256 of 64 hexadecimal digits, found {0:?}")]
+    BaseHash(String),
     /// Not JSON, or not of the right shape.
     #[error("line {line}: {detail}")]
     Syntax {
@@ -59,6 +68,24 @@ pub enum ChangeSetError {
         op: Op,
         /// The keys it needs.
         needs: &'static str,
+    },
+    /// A second delta of a feature.
+    #[error("line {line}: feature {fid} has two deltas, the first in line {first}; expected one at most")]
+    Twice {
+        /// Counted from 1.
+        line: usize,
+        /// The feature.
+        fid: Fid,
+        /// Line of its first one.
+        first: usize,
+    },
+    /// A delta whose sides are the same.
+    #[error("line {line}: feature {fid} changes nothing; expected an \"after\" that differs from \"before\"")]
+    NoChange {
+        /// Counted from 1.
+        line: usize,
+        /// The feature.
+        fid: Fid,
     },
     /// A feature number that no map gives.
     #[error("line {line}: fid {fid} is not between 1 and {}", Fid::MAX)]
@@ -106,23 +133,26 @@ impl ChangeSet {
 pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, ChangeSetError> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let (number, first) = lines.next().ok_or(ChangeSetError::Empty)?;
-    let syntax = |number: usize| {
-        move |error: serde_json::Error| ChangeSetError::Syntax { line: number + 1, detail: error.to_string() }
-    };
+    let syntax = |number: usize| move |error: serde_json::Error| syntax_error(number + 1, &error);
     let header: ChangeSetHeader = serde_json::from_str(first).map_err(syntax(number))?;
     if header.format != FORMAT {
         return Err(ChangeSetError::Format(header.format));
     }
     let observed_at = header.observed_at.map(|text| text.parse().map_err(|_| ChangeSetError::ObservedAt(text)));
+    let base_hash = header.base_hash.map(|text| text.parse().map_err(|_| ChangeSetError::BaseHash(text)));
     let mut set = ChangeSet {
         base: header.base_version.map(VersionId),
         author: header.author,
         message: header.message,
         observed_at: observed_at.transpose()?,
+        map_id: header.map_id,
+        base_hash: base_hash.transpose()?,
+        classes: header.classes.into_iter().flatten().map(|(name, index)| (index, name)).collect(),
         additions: Vec::new(),
         deltas: Vec::new(),
         geometries: BTreeMap::new(),
     };
+    let mut first_lines = BTreeMap::new();
     for (number, line) in lines {
         if is_geometry(line) {
             let geometry: GeometryLine = serde_json::from_str(line).map_err(syntax(number))?;
@@ -130,9 +160,30 @@ pub fn read_change_set(text: &str, classes: &ClassTable) -> Result<ChangeSet, Ch
             continue;
         }
         let change: ChangeLine = serde_json::from_str(line).map_err(syntax(number))?;
+        let deltas = set.deltas.len();
         read_line(&change, number + 1, classes, &mut set)?;
+        if let Some(delta) = set.deltas.get(deltas) {
+            check_delta(delta, number + 1, &mut first_lines)?;
+        }
     }
     Ok(set)
+}
+
+/// What the parser says of a line; to it every line is the first.
+fn syntax_error(line: usize, error: &serde_json::Error) -> ChangeSetError {
+    let (text, column) = (error.to_string(), error.column());
+    let what = text.strip_suffix(&format!(" at line {} column {column}", error.line()));
+    let detail = what.map_or_else(|| text.clone(), |what| format!("{what} (column {column})"));
+    ChangeSetError::Syntax { line, detail }
+}
+
+/// Refuses a delta that changes nothing, and a second one of a feature.
+fn check_delta(delta: &Delta, line: usize, first_lines: &mut BTreeMap<Fid, usize>) -> Result<(), ChangeSetError> {
+    let fid = delta.fid();
+    if delta.before() == delta.after() {
+        return Err(ChangeSetError::NoChange { line, fid });
+    }
+    first_lines.insert(fid, line).map_or(Ok(()), |first| Err(ChangeSetError::Twice { line, fid, first }))
 }
 
 fn read_line(
@@ -265,9 +316,29 @@ mod tests {
             author: set.author.clone(),
             message: set.message.clone(),
             observed_at: None,
+            map_id: None,
+            base_hash: None,
+            classes: None,
         };
         let text = write_change_set(&header, &set.deltas, (&classes, &classes), &BTreeMap::new()).unwrap();
         assert_eq!(read_change_set(&text, &ClassTable::default()), Ok(set));
+    }
+
+    #[test]
+    fn a_header_says_of_which_map_its_base_and_its_classes_are() {
+        let hash = Digest::of(b"version 3");
+        let more = format!(r#""map_id":"m","base_hash":"{hash}","classes":{{"glass":1,"stone":0}},"message""#);
+        let text = HEADER.replace("\"message\"", &more);
+        let set = read_change_set(&text, &ClassTable::default()).unwrap();
+        assert_eq!((set.map_id.as_deref(), set.base_hash), (Some("m"), Some(hash)));
+        let names: Vec<_> = set.classes.iter().map(|(index, name)| (index.0, name.as_str())).collect();
+        assert_eq!(names, [(0, "stone"), (1, "glass")]);
+        let header: ChangeSetHeader = serde_json::from_str(&text).unwrap();
+        let classes = ClassTable::default();
+        let written = write_change_set(&header, &[], (&classes, &classes), &BTreeMap::new()).unwrap();
+        assert_eq!(read_change_set(&written, &classes), Ok(set));
+        let wrong = text.replace(&hash.to_string(), "abc");
+        assert_eq!(read_change_set(&wrong, &classes), Err(ChangeSetError::BaseHash("abc".to_owned())));
     }
 
     #[test]
@@ -322,7 +393,17 @@ mod tests {
                 &format!("\n{{\"op\":\"add\",\"after\":{}}}", CHAIR.replace("chair", "sofa")),
                 "line 3, after: class \"sofa\"",
             ),
-            ("{", "line 2: EOF"),
+            ("{", "line 2: EOF while parsing an object (column 1)"),
+            (
+                &format!(
+                    "{{\"op\":\"add\",\"fid\":7,\"after\":{CHAIR}}}\n\n{{\"op\":\"remove\",\"fid\":7,\"before\":{CHAIR}}}"
+                ),
+                "line 4: feature 7 has two deltas, the first in line 2",
+            ),
+            (
+                &format!("{{\"op\":\"modify\",\"fid\":7,\"before\":{CHAIR},\"after\":{CHAIR}}}"),
+                "line 2: feature 7 changes nothing",
+            ),
         ] {
             let found = read(lines).unwrap_err().to_string();
             assert!(found.starts_with(expected), "{lines}\nexpected {expected}\nfound {found}");

@@ -76,6 +76,7 @@ pub fn descriptor_from_file(file: &DescriptorFile, classes: &ClassTable) -> Resu
 pub fn descriptor_to_file(descriptor: &Descriptor, classes: &ClassTable) -> DescriptorFile {
     let sigma = descriptor.sigma();
     let mut file = DescriptorFile {
+        kind: None,
         class: classes.name(descriptor.class()).to_owned(),
         corners: None,
         centre: None,

@@ -3,6 +3,10 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::fmt;
+use std::io::Read;
+
+/// Bytes read at a time.
+const CHUNK: usize = 64 << 10;
 
 /// A SHA-256 digest; written as 64 lower-case hexadecimal digits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -18,6 +22,19 @@ impl Digest {
     /// The digest of `bytes`.
     pub fn of(bytes: &[u8]) -> Self {
         Self(Sha256::digest(bytes).into())
+    }
+
+    /// The digest of all that `from` gives, which need not fit into memory.
+    pub fn of_all(mut from: impl Read) -> std::io::Result<Self> {
+        let (mut hasher, mut chunk) = (Sha256::new(), vec![0; CHUNK]);
+        loop {
+            match from.read(&mut chunk) {
+                Ok(0) => return Ok(Self(hasher.finalize().into())),
+                Ok(bytes) => hasher.update(&chunk[..bytes]),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 }
 
@@ -74,6 +91,14 @@ mod tests {
     fn the_digest_of_abc_is_that_of_the_standard() {
         assert_eq!(Digest::of(b"abc").to_string(), ABC);
         assert_eq!(ABC.parse(), Ok(Digest::of(b"abc")));
+    }
+
+    #[test]
+    fn what_comes_in_pieces_has_the_digest_of_the_whole() {
+        let bytes: Vec<u8> = (0..3 * CHUNK + 7).map(|index| index as u8).collect();
+        let pieces = (&bytes[..5]).chain(&bytes[5..]);
+        assert_eq!(Digest::of_all(pieces).unwrap(), Digest::of(&bytes));
+        assert_eq!(Digest::of_all(&[][..]).unwrap(), Digest::of(&[]));
     }
 
     #[test]

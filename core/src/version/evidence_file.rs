@@ -29,6 +29,8 @@ impl<'de> Deserialize<'de> for Number {
 struct ObservationFile {
     format: String,
     capture: Digest,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    photo: Option<Digest>,
     taken_at: Option<String>,
     labels: Option<Digest>,
     prior: Option<PriorFile>,
@@ -124,6 +126,7 @@ impl Observation {
         let file = ObservationFile {
             format: FORMAT.to_owned(),
             capture: self.capture,
+            photo: self.photo,
             taken_at: self.taken_at.map(|time| time.to_string()),
             labels: self.labels.as_deref().map(Digest::of),
             prior: self.prior.as_ref().map(prior_to_file),
@@ -149,6 +152,7 @@ impl Observation {
         let taken_at = file.taken_at.map(|text| text.parse::<Timestamp>()).transpose();
         Ok(Self {
             capture: file.capture,
+            photo: file.photo,
             taken_at: taken_at.map_err(|error| format!("taken_at: {error}"))?,
             labels: None,
             prior: file.prior.as_ref().map(prior_from_file),

@@ -79,7 +79,7 @@ pub enum InvalidState {
 }
 
 /// A unit normal is this near length 1: what twelve decimal digits keep.
-const UNIT_TOLERANCE: f64 = 1e-9;
+pub(crate) const UNIT_TOLERANCE: f64 = 1e-9;
 /// Corners may be this far off their plane, metres (as the coplanarity requirement of the estimator) …
 const PLANE_LIMIT_M: f64 = 0.10;
 /// … or this share of the diagonal, whichever is more.

@@ -24,6 +24,7 @@ pub use change_set::{ChangeSet, ChangeSetError, read_change_set, write_change_se
 pub use delta::{Counts, Delta};
 pub use descriptor_file::{InvalidDescriptor, descriptor_from_file, descriptor_to_file};
 pub use digest::{Digest, InvalidDigest};
+pub(crate) use feature_state::UNIT_TOLERANCE;
 pub use feature_state::{FeatureState, InvalidState};
 pub use observation::{Decision, Gate, LocalizationEvidence, ModelFile, Observation, PluginUse, SearchRange};
 pub use operations::{Frame, Operations, version_hash};

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 pub struct Observation {
     /// Digest of the capture.
     pub capture: Digest,
+    /// Digest of what the photo shows, whatever file it comes in: two captures of one photo share it; maps before 2026-12
+    /// do not say.
+    pub photo: Option<Digest>,
     /// When the photo was taken.
     pub taken_at: Option<Timestamp>,
     /// The label image as PNG, when it is to be kept.

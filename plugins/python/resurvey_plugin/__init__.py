@@ -1,4 +1,4 @@
-"""Plugins for resurvey in Python: a matcher, a change detector or a descriptor estimator is one class.
+"""Plugins for resurvey in Python: a matcher, a change detector, a descriptor estimator or a segmenter is one class.
 
     class Agreement(Plugin):
         NAME, VERSION, SUMMARY = "agreement", "1.0.0", "Share of pixels whose class is the same"
@@ -14,13 +14,15 @@ It runs in a process of its own and speaks the wire of docs/plugin-wire.md. NumP
 that the host runs.
 """
 
-from .plugin import Cancelled, Failed, Plugin, declaration
+from .host import Host
+from .plugin import Cancelled, Failed, Plugin, Settings, declaration
 from .records import (
     CLASS_COUNTS,
     Alignment,
     Camera,
     ClassInfo,
     Comparison,
+    Descriptor,
     DynamicDescriptor,
     Estimate,
     Localization,
@@ -28,6 +30,7 @@ from .records import (
     Photo,
     Place,
     Pose,
+    PoseEstimate,
     Prior,
     Region,
     Reject,
@@ -42,7 +45,7 @@ VOID = 255
 
 __version__ = "0.1.0"
 __all__ = [
-    "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "DynamicDescriptor", "Estimate",
-    "Failed", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "Prior", "Region", "Reject",
-    "Remove", "RunnerUp", "View", "declaration", "main",
+    "CLASS_COUNTS", "VOID", "Alignment", "Camera", "Cancelled", "ClassInfo", "Comparison", "Descriptor", "DynamicDescriptor",
+    "Estimate", "Failed", "Host", "Localization", "MaterialDescriptor", "Photo", "Place", "Plugin", "Pose", "PoseEstimate", "Prior",
+    "Region", "Reject", "Remove", "RunnerUp", "Settings", "View", "declaration", "main",
 ]

@@ -2,9 +2,10 @@
 
 import json
 import re
+from typing import Any, Dict, Type
 
 WIRE = 1
-_CALLS = {"score": "matcher", "search": "matcher", "detect": "detector", "estimate": "estimator"}
+_CALLS = {"score": "matcher", "search": "matcher", "detect": "detector", "estimate": "estimator", "segment": "segmenter"}
 
 
 class Failed(Exception):
@@ -16,9 +17,13 @@ class Cancelled(Exception):
 
 
 class Settings(dict):
-    """The settings, checked and completed by the host: `settings.void` and `settings["void"]` are the same."""
+    """The settings, checked and completed by the host: `settings.void` and `settings["void"]` are the same, also where a
+    setting is called `items` or `values`."""
 
-    def __getattr__(self, name):
+    def __getattribute__(self, name: str) -> Any:
+        return self[name] if dict.__contains__(self, name) else super().__getattribute__(name)
+
+    def __getattr__(self, name: str) -> Any:
         try:
             return self[name]
         except KeyError:
@@ -26,20 +31,28 @@ class Settings(dict):
 
 
 class Plugin:
-    """Base of a plugin: `score`, `search`, `detect` or `estimate` makes it one of a kind.
+    """Base of a plugin: `score`, `search`, `detect`, `estimate` or `segment` makes it one of a kind.
 
-    An instance lives for a run and is called by one thread at a time.
+    An instance lives for a run and is called by one thread at a time. It has `settings` before its `__init__(self, settings)`
+    begins, which is where weights are loaded.
     """
 
-    NAME = ""
-    VERSION = ""
-    SUMMARY = ""
-    SETTINGS = {}
+    NAME: str = ""
+    VERSION: str = ""
+    SUMMARY: str = ""
+    SETTINGS: Dict[str, Dict[str, Any]] = {}
     """Name of a setting → its flat JSON schema: `type`, `default`, and where it helps `minimum`, `maximum`, `enum`,
     `description` (say the unit)."""
 
-    def __init__(self, settings):
-        self.settings = settings
+    settings: Settings
+
+    def __new__(cls, settings: Settings):
+        instance = super().__new__(cls)
+        instance.settings = settings
+        return instance
+
+    def __init__(self, settings: Settings):
+        pass
 
 
 def hello(plugin):
@@ -48,7 +61,7 @@ def hello(plugin):
     kinds = sorted({_CALLS[call] for call in calls})
     if len(kinds) != 1:
         found = " and ".join(calls) or "none of them"
-        raise TypeError(f"{plugin.__name__} needs score, search, detect or estimate, found {found}")
+        raise TypeError(f"{plugin.__name__} needs score, search, detect, estimate or segment, found {found}")
     if not re.fullmatch(r"[a-z0-9-]{1,47}", plugin.NAME):
         raise ValueError(f"{plugin.__name__}.NAME: expected up to 47 of a-z, 0-9 and dashes, found {plugin.NAME!r}")
     for field, most in (("VERSION", 23), ("SUMMARY", 159)):
@@ -68,7 +81,7 @@ def hello(plugin):
     return words
 
 
-def declaration(plugin):
+def declaration(plugin: Type[Plugin]) -> str:
     """The line that the file of the plugin holds, so that the host knows it without running it."""
     words = {key: value for key, value in hello(plugin).items() if key in ("wire", "kind", "name", "version", "summary")}
     return "# resurvey-plugin: " + json.dumps(words)

@@ -5,7 +5,7 @@ roll (right side down). Pixel (i, j) has its centre at (i + 0.5, j + 0.5), the o
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class Pose(NamedTuple):
     roll_rad: float = 0.0
 
     @property
-    def position(self):
+    def position(self) -> np.ndarray:
         """Easting, northing, height."""
         return np.array(self[:3])
 
@@ -92,6 +92,10 @@ class Estimate:
     height_sigma_m: float
     tilt_sigma_rad: float
     alignment: Optional[Alignment] = None
+
+
+PoseEstimate = Estimate
+"""The name that Rust and C have for it."""
 
 
 @dataclass(frozen=True)
@@ -166,8 +170,11 @@ class Region:
     mask: np.ndarray
 
     @classmethod
-    def of(cls, mask, class_before, class_after):
-        """The region of the pixels that are true in `mask`, an image as large as the photo."""
+    def of(cls, mask: np.ndarray, class_before: int, class_after: int) -> "Region":
+        """The region of the pixels that are not 0 in `mask`, an image as large as the photo."""
+        mask = np.asarray(mask) != 0
+        if mask.ndim != 2:
+            raise ValueError(f"expected a mask of rows and columns, found an array of shape {mask.shape}")
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not rows.size:
             raise ValueError("expected a mask with at least one pixel, found none")
@@ -175,12 +182,12 @@ class Region:
         return cls(int(class_before), int(class_after), int(columns[0]), int(rows[0]), box.astype(np.uint8))
 
     @property
-    def pixels(self):
+    def pixels(self) -> int:
         """Number of pixels."""
         return int(np.count_nonzero(self.mask))
 
     @property
-    def rows_and_columns(self):
+    def rows_and_columns(self) -> Tuple[slice, slice]:
         """Slices that cut the box out of an image: `view.points[region.rows_and_columns]`."""
         height, width = self.mask.shape
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
@@ -208,12 +215,15 @@ class DynamicDescriptor:
     sigma: Optional[Tuple[float, Optional[float], Optional[float]]] = None
 
 
+Descriptor = Union[MaterialDescriptor, DynamicDescriptor]
+
+
 @dataclass
 class Place:
     """Put a descriptor on the map; `region` is the index of the region it comes from, as in all proposals."""
 
     region: int
-    descriptor: object
+    descriptor: Descriptor
 
 
 @dataclass

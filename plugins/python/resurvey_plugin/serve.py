@@ -5,21 +5,22 @@ import os
 import stat
 import sys
 import traceback
+from typing import Type
 
 import numpy as np
 
 from . import words
 from .host import Host, ask, views
 from .link import Ended, Link
-from .plugin import Cancelled, Failed, Settings, hello
-from .records import Comparison, Localization, Photo, Region
+from .plugin import Cancelled, Failed, Plugin, Settings, hello
+from .records import Comparison, Localization, Photo, Place, Region, Reject, Remove
 
 _REGIONS_IN_A_MESSAGE = 500
-_TEXT = 10_000
+_TEXT_BYTES = 10_000
 _OWN = os.path.dirname(os.path.abspath(__file__))
 
 
-def main(plugin):
+def main(plugin: Type[Plugin]) -> None:
     """Serves `plugin` to the host that started this process; returns when the host is done."""
     words_of_plugin = hello(plugin)
     if not stat.S_ISSOCK(os.fstat(1).st_mode):
@@ -60,7 +61,7 @@ def _answer(link, plugin, instance, call, value):
         if link.cancelled():
             link.send("cancelled", {})
         else:
-            link.send("failed", {"text": str(failure)[:_TEXT]})
+            link.send("failed", {"text": words.text(failure, _TEXT_BYTES)})
     except BaseException as error:  # A SystemExit of the author is a bug as well, and is told as one.
         traceback.print_exc()
         link.send("panicked", {"text": _told(error)})
@@ -74,8 +75,8 @@ def _told(error):
     text = "".join(traceback.format_exception_only(type(error), error)).strip()
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if os.path.dirname(os.path.abspath(frame.filename)) != _OWN]
-    frame = (own or list(frames))[-1]
-    return f"{text[:_TEXT]} ({os.path.basename(frame.filename)}:{frame.lineno})"
+    place = f" ({os.path.basename(own[-1].filename)}:{own[-1].lineno})" if own else ""
+    return words.text(text, _TEXT_BYTES) + place
 
 
 def _score(link, instance, value):
@@ -83,9 +84,29 @@ def _score(link, instance, value):
     for index, view in enumerate(views(link, value["views"])):
         if link.cancelled():
             raise Cancelled
-        scores[index] = instance.score(photo, view)
+        scores[index] = _number(instance.score(photo, view))
         link.scored_one()
     return {}
+
+
+def _number(score):
+    if isinstance(score, np.ndarray) and score.ndim:
+        raise TypeError(f"expected score to return a number from 0 to 1, found an array of shape {score.shape}")
+    if score is None or isinstance(score, (str, bytes)):
+        raise TypeError(f"expected score to return a number from 0 to 1, found {type(score).__name__}")
+    return float(score)
+
+
+def _listed(found, call, *records):
+    """The records that a call returned, one after the other or as a list."""
+    names = " or ".join(record.__name__ for record in records)
+    if not hasattr(found, "__iter__"):
+        raise TypeError(f"expected {call} to return a list of {names}, found {type(found).__name__}; [] is none")
+    listed = list(found)
+    for one in listed:
+        if not isinstance(one, records):
+            raise TypeError(f"expected {call} to return a list of {names}, found {type(one).__name__} in it")
+    return listed
 
 
 def _search(link, instance, value):
@@ -102,7 +123,13 @@ def _search(link, instance, value):
 
 
 def _detect(link, instance, value):
-    regions = list(instance.detect(_comparison(link, value), Host(link, value)))
+    regions = _listed(instance.detect(_comparison(link, value), Host(link, value)), "detect", Region)
+    rows, columns = value["photo"]["shape"]
+    for region in regions:
+        shape = np.shape(region.mask)
+        if len(shape) != 2 or shape[0] > rows or shape[1] > columns:
+            found = " × ".join(map(str, shape)) or "one value"
+            raise ValueError(f"expected a mask within the photo of {rows} × {columns} pixels, found {found}")
     start, scratch = 0, value["scratch"]
     while start < len(regions):
         offset, message = scratch["offset"], []
@@ -118,8 +145,6 @@ def _detect(link, instance, value):
 
 
 def _region(region, mask, words_of_mask):
-    if mask.ndim != 2:
-        raise ValueError(f"expected a mask of rows and columns, found an array of shape {mask.shape}")
     left, top = int(region.left), int(region.top)
     bounds = [left, top, left + mask.shape[1], top + mask.shape[0]]
     return {"class_before": int(region.class_before), "class_after": int(region.class_after), "bounds": bounds,
@@ -131,7 +156,7 @@ def _estimate(link, instance, value):
     regions = [Region(item["class_before"], item["class_after"], item["bounds"][0], item["bounds"][1],
                       link.lent(item["mask"])) for item in value["regions"]]
     found = instance.estimate(_comparison(link, comparison), regions, Host(link, comparison))
-    proposals = [words.proposal(proposal, regions) for proposal in found]
+    proposals = [words.proposal(one, regions) for one in _listed(found, "estimate", Place, Remove, Reject)]
     for start in range(0, len(proposals), _REGIONS_IN_A_MESSAGE):
         ask(link, "proposals", proposals[start:start + _REGIONS_IN_A_MESSAGE])
     return {}
@@ -142,4 +167,18 @@ def _comparison(link, value):
     return Comparison(link.lent(value["photo"]), view, words.camera(value["camera"]), words.estimate(value["estimate"]))
 
 
-_SERVED = {"score": _score, "search": _search, "detect": _detect, "estimate": _estimate}
+def _segment(link, instance, value):
+    photo = link.lent(value["photo"])
+    rows, columns, _ = photo.shape
+    labels = np.asarray(instance.segment(photo, Host(link, value)))
+    if labels.shape != (rows, columns) or labels.dtype.kind not in "iu":
+        raise TypeError(f"expected segment to return {rows} × {columns} whole numbers, found an array of shape "
+                        f"{labels.shape} and type {labels.dtype}")
+    # Another one would wrap to a class: 256 to stone, and -1, as some networks call what they ignore, to VOID by chance.
+    if labels.size and (labels.min() < 0 or labels.max() > 255):
+        raise ValueError(f"expected labels from 0 to 255, found {labels.min()} to {labels.max()}; what is no class is VOID")
+    link.place(value["labels"])[...] = labels
+    return {}
+
+
+_SERVED = {"score": _score, "search": _search, "detect": _detect, "estimate": _estimate, "segment": _segment}

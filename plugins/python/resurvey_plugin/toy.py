@@ -1,22 +1,28 @@
 """A toy world for tests without a map: painted walls, boxes, a flat ground and descriptors, ray cast exactly for a pinhole
-camera, one ray per pixel. The same as `resurvey_plugin::toy` of the Rust SDK: the oracle, not the renderer.
+camera, one ray per pixel. Seen exactly as by `resurvey_plugin::toy` of the Rust SDK: the oracle, not the renderer.
 
     host = toy.street()
     photo = host.photo(toy.POSE)
     assert Agreement(toy.settings(Agreement)).score(photo.labels, host.view(toy.POSE)) == 1.0
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import Dict, Iterable, List, Optional, Tuple, Type
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .plugin import Cancelled, Failed, Settings
+from .host import class_named
+from .plugin import Cancelled, Failed, Plugin, Settings
 from .records import (
     RAY_HIT,
     VIEW_FEATURE,
     Camera,
     ClassInfo,
     Comparison,
+    Descriptor,
     DynamicDescriptor,
     Estimate,
     MaterialDescriptor,
@@ -56,23 +62,23 @@ class _Face:
 class Scene:
     """What stands in the toy world."""
 
-    ground: tuple = None
+    ground: Optional[Tuple[float, int]] = None
     """Height in metres and class of the endless flat ground."""
     faces: list = field(default_factory=list)
-    descriptors: dict = field(default_factory=dict)
+    descriptors: Dict[int, Descriptor] = field(default_factory=dict)
     """Feature id → descriptor."""
 
-    def add_wall(self, start, end, heights_m, class_index):
+    def add_wall(self, start: ArrayLike, end: ArrayLike, heights_m: Tuple[float, float], class_index: int) -> None:
         """A vertical wall over the plan segment `start`–`end` (easting, northing; seen from outside left to right)."""
         low, high = heights_m
         corners = [(*start, low), (*end, low), (*end, high), (*start, high)]
         self.faces.append(_Face(np.array(corners, dtype=float), class_index))
 
-    def add_box(self, position, size_m, class_index):
+    def add_box(self, position: ArrayLike, size_m: ArrayLike, class_index: int) -> None:
         """An upright box that stands on `position`."""
         self.faces += _box(DynamicDescriptor(class_index, position, size_m), 0)
 
-    def add_descriptor(self, descriptor):
+    def add_descriptor(self, descriptor: Descriptor) -> int:
         """Puts a descriptor on the map; gives its feature id."""
         fid = max(self.descriptors, default=0) + 1
         self.descriptors[fid] = descriptor
@@ -92,20 +98,20 @@ class Scene:
 class ToyHost:
     """The services of `resurvey_plugin.host.Host` on a toy world. It has no map projection: WGS84 is an error."""
 
-    def __init__(self, scene, camera):
+    def __init__(self, scene: Scene, camera: Camera):
         self.scene = scene
         self.camera = camera
         self.classes = list(CLASSES)
         self.slots = 9
-        self.lines = []
+        self.lines: List[Tuple[str, str]] = []
         """What was logged: level and text."""
-        self.fractions = []
+        self.fractions: List[float] = []
         """What progress was told."""
         self.is_cancelled = False
         """Set it to see what a plugin makes of a cancel."""
-        self._photo = None
+        self._photo: Optional[np.ndarray] = None
 
-    def view(self, pose, stride=1, with_descriptors=True):
+    def view(self, pose: Pose, stride: int = 1, with_descriptors: bool = True) -> View:
         """What the map looks like at `pose`."""
         camera = self.camera
         u, v = (np.arange(0, size, stride) + 0.5 for size in (camera.width, camera.height))
@@ -123,46 +129,71 @@ class ToyHost:
                     (times * np.linalg.norm(rays, axis=-1)).astype("f4").reshape(shape),
                     points.astype("f4").reshape((*shape, 3)), features[face_of].reshape(shape), table)
 
-    def photo(self, pose, prior=None):
+    def picture(self, pose: Pose) -> np.ndarray:
+        """What a camera at `pose` would take in the colours of the classes: red, green, blue (`uint8` [rows, columns, 3])."""
+        colours = np.zeros((256, 3), dtype="u1")
+        for item in self.classes:
+            colours[item.index] = item.colour
+        return colours[self.view(pose).labels]
+
+    def placeless(self):
+        """The host that a segmenter has: the class table, log, progress and cancellation. Every other service is `Failed`."""
+        return _Placeless(self)
+
+    def photo(self, pose: Pose, prior: Optional[Prior] = None) -> Photo:
         """A photo of this world taken at `pose`; the comparisons of this host are with the last one."""
         prior = prior or Prior(pose, 5.0, 0.5, 0.1, 0.02)
         self._photo = self.view(pose).labels
         return Photo(self._photo, self.camera, prior)
 
-    def comparison(self, photo, pose):
+    def comparison(self, photo: np.ndarray, pose: Pose) -> Comparison:
         """Labels of a photo beside the view of this map at `pose`, for a detector or an estimator."""
         estimate = Estimate(pose, np.diag([0.01, 0.01, 1e-6]), 0.05, 0.002)
         return Comparison(photo, self.view(pose), self.camera, estimate)
 
-    def render(self, poses, stride=1, with_descriptors=True):
-        for pose in poses:
-            yield self.view(Pose(*pose), stride, with_descriptors)
+    def class_named(self, name: str) -> ClassInfo:
+        return class_named(self.classes, name)
 
-    def compare_views(self, poses, stride=1, ignored_in_photo=(), ignored_in_view=(), boundary_tolerance_px=0.0):
-        if boundary_tolerance_px:
-            raise Failed("the toy host does not count boundaries")
+    def render(self, poses: ArrayLike, stride: int = 1, with_descriptors: bool = True) -> List[View]:
+        return [self.view(Pose(*pose), stride, with_descriptors) for pose in poses]
+
+    def compare_views(self, poses: ArrayLike, stride: int = 1, ignored_in_photo: Iterable[int] = (),
+                      ignored_in_view: Iterable[int] = (), boundary_tolerance_px: float = 0.0) -> np.ndarray:
         if self._photo is None:
             raise Failed("the toy host has no photo: call photo first")
         photo = self._photo[::stride, ::stride]
+        takes_part = ~np.isin(photo, [*ignored_in_photo, 255])
         counts = np.zeros((len(poses), self.slots, 7), dtype="u4")
         for count, view in zip(counts, self.render(poses, stride)):
-            compared = ~np.isin(photo, [*ignored_in_photo, 255]) & ~np.isin(view.labels, [*ignored_in_view])
+            compared = takes_part & (photo < self.slots) & (view.labels < self.slots)
+            compared &= ~np.isin(view.labels, [*ignored_in_view])
             for index in range(self.slots):
                 in_photo, in_view = compared & (photo == index), compared & (view.labels == index)
                 count[index, :3] = in_photo.sum(), in_view.sum(), (in_photo & in_view).sum()
+                if boundary_tolerance_px > 0:
+                    edges = [np.argwhere(_boundary(labels == index) & takes_part) for labels in (photo, view.labels)]
+                    near = _near(edges, boundary_tolerance_px / stride)
+                    count[index, 3:] = len(edges[0]), near.any(axis=1).sum(), len(edges[1]), near.any(axis=0).sum()
         return counts
 
-    def compare_panoramas(self, positions, **_):
-        raise Failed("the toy host does not offer compare_panoramas")
+    def compare_panoramas(self, positions: ArrayLike, *, columns: int, yaw_count: int, yaw_step_columns: int = 1,
+                          first_yaw_rad: float = 0.0, pitch_rad: float = 0.0, roll_rad: float = 0.0,
+                          ignored_in_photo: Iterable[int] = (), ignored_in_view: Iterable[int] = ()) -> np.ndarray:
+        """Compares a view at every heading: it counts pixels where the host counts cells of a panorama; shares are alike."""
+        step_rad = 2 * np.pi / columns
+        yaws = step_rad * (np.round(first_yaw_rad / step_rad) + yaw_step_columns * np.arange(yaw_count))
+        poses = [(*position, yaw, pitch_rad, roll_rad) for position in positions for yaw in yaws]
+        counts = self.compare_views(poses, 1, ignored_in_photo, ignored_in_view)
+        return counts.reshape(len(positions), yaw_count, self.slots, 7)
 
-    def inside_solid(self, points):
+    def inside_solid(self, points: ArrayLike) -> np.ndarray:
         return np.zeros(len(points), dtype=bool)
 
-    def pixel_rays(self, pose, pixels):
+    def pixel_rays(self, pose: Pose, pixels: ArrayLike) -> np.ndarray:
         rays = _rays(self.camera, pose, np.asarray(pixels, dtype=float))
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
-    def project(self, pose, points):
+    def project(self, pose: Pose, points: ArrayLike) -> np.ndarray:
         right, down, forward = _axes(pose)
         offsets = np.asarray(points, dtype=float) - pose.position
         depth = offsets @ forward
@@ -171,7 +202,8 @@ class ToyHost:
         return np.stack([camera.fx * (offsets @ right) / depth + camera.cx,
                          camera.fy * (offsets @ down) / depth + camera.cy], axis=-1)
 
-    def cast_rays(self, origin, directions, limit_m=None, with_descriptors=True):
+    def cast_rays(self, origin: ArrayLike, directions: ArrayLike, limit_m: Optional[float] = None,
+                  with_descriptors: bool = True) -> np.ndarray:
         origin, directions = np.asarray(origin, dtype=float), np.asarray(directions, dtype=float)
         times, face_of, faces = self._cast(origin, directions, with_descriptors)
         ranges = times * np.linalg.norm(directions, axis=-1)
@@ -188,7 +220,7 @@ class ToyHost:
             hit["fid"], hit["has_fid"] = face.fid, bool(face.fid)
         return hits
 
-    def descriptors_near(self, point, radius_m):
+    def descriptors_near(self, point: ArrayLike, radius_m: float) -> List[Tuple[int, Descriptor]]:
         def anchor(descriptor):
             is_material = isinstance(descriptor, MaterialDescriptor)
             return np.mean(descriptor.corners, axis=0) if is_material else np.asarray(descriptor.position, dtype=float)
@@ -196,26 +228,26 @@ class ToyHost:
         return [(fid, descriptor) for fid, descriptor in sorted(self.scene.descriptors.items())
                 if np.linalg.norm(anchor(descriptor) - np.asarray(point)) <= radius_m]
 
-    def ground_height(self, point):
+    def ground_height(self, point: ArrayLike) -> Optional[float]:
         hit = self.cast_rays(point, [[0.0, 0.0, -1.0]], with_descriptors=False)[0]
         return float(hit["point"][2]) if hit["hit"] else None
 
-    def grid_from_wgs84(self, position):
+    def grid_from_wgs84(self, position: ArrayLike) -> np.ndarray:
         raise Failed("the toy host does not offer grid_from_wgs84")
 
-    def wgs84_from_grid(self, point):
+    def wgs84_from_grid(self, point: ArrayLike) -> np.ndarray:
         raise Failed("the toy host does not offer wgs84_from_grid")
 
-    def log(self, text, level="info"):
+    def log(self, text: str, level: str = "info") -> None:
         self.lines.append((level, text))
 
-    def progress(self, fraction):
+    def progress(self, fraction: float) -> None:
         self.fractions.append(fraction)
 
-    def cancelled(self):
+    def cancelled(self) -> bool:
         return self.is_cancelled
 
-    def check_cancelled(self):
+    def check_cancelled(self) -> None:
         if self.is_cancelled:
             raise Cancelled
 
@@ -235,13 +267,29 @@ class ToyHost:
         return nearest, face_of, faces
 
 
-def camera(width=320, height=240, diagonal_fov_deg=90.0):
+class _Placeless:
+    """A `ToyHost` before anybody knows where the photo was taken."""
+
+    _KEPT = ("classes", "class_named", "slots", "lines", "fractions", "is_cancelled", "log", "progress", "cancelled",
+             "check_cancelled")
+
+    def __init__(self, host):
+        self._host = host
+
+    def __getattr__(self, name):
+        found = getattr(self._host, name)
+        if name in self._KEPT:
+            return found
+        raise Failed("a segmenter has no map: nobody knows yet where the photo was taken")
+
+
+def camera(width: int = 320, height: int = 240, diagonal_fov_deg: float = 90.0) -> Camera:
     """A centred pinhole with square pixels."""
     focal = np.hypot(width, height) / 2 / np.tan(np.radians(diagonal_fov_deg) / 2)
     return Camera("pinhole", width, height, focal, focal, width / 2, height / 2)
 
 
-def street(width=320, height=240):
+def street(width: int = 320, height: int = 240) -> ToyHost:
     """A host of a street seen from `POSE`: 10 m ahead a stone wall with windows and a shop front, at its ends other houses."""
     scene = Scene(ground=(4.0, OTHERS))
     east, north = POSE.easting_m, POSE.northing_m + 10.0
@@ -254,14 +302,14 @@ def street(width=320, height=240):
     return ToyHost(scene, camera(width, height))
 
 
-def banner():
+def banner() -> MaterialDescriptor:
     """A banner of 3 m × 1 m for the wall of `street`: `street().scene.add_descriptor(banner())`."""
     east, north = POSE.easting_m - 6.0, POSE.northing_m + 10.0
     corners = [(east, north, 7.0), (east + 3.0, north, 7.0), (east + 3.0, north, 8.0), (east, north, 8.0)]
     return MaterialDescriptor(BANNER, np.array(corners), np.array([0.0, -1.0, 0.0]))
 
 
-def settings(plugin, **changed):
+def settings(plugin: Type[Plugin], **changed) -> Settings:
     """The settings of a plugin with their defaults, but for those named."""
     return Settings({**{name: schema["default"] for name, schema in plugin.SETTINGS.items()}, **changed})
 
@@ -297,6 +345,18 @@ def _meet(corners, origin, rays):
     inside = rays * times[:, None] - to_corner
     s, t = inside @ along / (along @ along), inside @ up / (up @ up)
     return np.where((s >= 0) & (s <= 1) & (t >= 0) & (t <= 1), times, np.nan)
+
+
+def _boundary(inside):
+    """Pixels of a mask with a neighbour by their side, inside the image, that is outside of it."""
+    wide = np.pad(inside, 1, constant_values=True)
+    return inside & ~(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])
+
+
+def _near(edges, tolerance_px):
+    """Which pixels of the one list are within the tolerance of which of the other."""
+    between = edges[0][:, None, :] - edges[1][None, :, :]
+    return (between**2).sum(axis=-1) <= tolerance_px**2
 
 
 def _take(nearest, face_of, times, index):

@@ -25,6 +25,11 @@ def line(name, value):
     return json.dumps({name: value}, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
+def text(value, most_bytes):
+    """A text, cut to whole characters; a message holds no half of a surrogate pair, as names of files may."""
+    return str(value).encode("utf-8", "replace")[:most_bytes].decode("utf-8", "ignore")
+
+
 def number(value):
     """A number; JSON has no NaN and no infinity, null stands for them."""
     value = float(value)
@@ -111,8 +116,6 @@ def proposal(record, regions):
     if isinstance(record, Remove):
         return {"remove": {"region": index, "class": int(record.class_index), "near": numbers(record.near, 3),
                            "sigma_m": number(record.sigma_m)}}
-    if not isinstance(record, Reject):
-        raise TypeError(f"expected Place, Remove or Reject, found {type(record).__name__}")
     if not 0 <= index < len(regions):
         raise ValueError(f"expected the index of one of {len(regions)} regions, found {index}")
     region = regions[index]

@@ -9,11 +9,12 @@ import sys
 
 import numpy as np
 
-from resurvey_plugin import toy, words
+from resurvey_plugin import Failed, toy, words
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 HEADER = 4096
 SCRATCH = 1 << 20
+LONGEST_LINE = 1 << 20
 
 
 class FakeHost:
@@ -26,6 +27,7 @@ class FakeHost:
         self.memory = mmap.mmap(self.file, HEADER)
         self.memory[:8] = b"RSVWIRE1"
         self.size = HEADER
+        self.mark = None
         ours, theirs = socket.socketpair()
         ours.settimeout(20)
         environment = {**os.environ, "PYTHONPATH": package}
@@ -55,7 +57,9 @@ class FakeHost:
 
     def raw(self):
         """The next message, whatever it is."""
-        (name, value), = json.loads(self.lines.readline()).items()
+        line = self.lines.readline()
+        assert len(line) <= LONGEST_LINE, f"a line of {len(line)} bytes"
+        (name, value), = json.loads(line).items()
         return name, value
 
     def ask(self, call, value):
@@ -71,14 +75,15 @@ class FakeHost:
         return self.ask("create", {"settings": json.dumps(settings or {}, separators=(",", ":"), sort_keys=True)})
 
     def lend(self, array, padding=0):
-        """Puts an array into the memory; its rows may be `padding` values longer."""
+        """Puts an array into the memory, which never shrinks; its rows may be `padding` values longer."""
         array = np.asarray(array)
         offset = (self.size + 63) // 64 * 64
         wide = np.zeros((*array.shape[:-1], array.shape[-1] + padding), array.dtype)
         wide[..., :array.shape[-1]] = array
         self.size = offset + wide.nbytes
-        os.ftruncate(self.file, max(self.size, HEADER))
-        self.memory = mmap.mmap(self.file, self.size)
+        if self.size > len(self.memory):
+            os.ftruncate(self.file, self.size)
+            self.memory = mmap.mmap(self.file, self.size)
         self.memory[offset:offset + wide.nbytes] = wide.tobytes()
         dtype = array.dtype.str if array.dtype.fields is None else f"|V{array.dtype.itemsize}"
         return {"dtype": dtype, "shape": list(array.shape), "strides": list(wide.strides), "offset": offset}
@@ -98,11 +103,15 @@ class FakeHost:
 
     def call(self, photo, **others):
         """What search and detect have in common."""
+        camera = {**vars(self.world.camera), "distortion": [0.0] * 5}
+        return self._begun({"photo": self.lend(photo), "camera": camera, **others})
+
+    def _begun(self, value):
+        """A call with what all have that may use services."""
         scratch = self.lend(np.zeros(SCRATCH, "u1"))["offset"]
         classes = [{key: value for key, value in item._asdict().items() if value is not None} for item in self.world.classes]
-        value = {"scratch": {"offset": scratch, "bytes": SCRATCH}, "classes": classes, "photo": self.lend(photo),
-                 "camera": {**vars(self.world.camera), "distortion": [0.0] * 5}, **others}
-        return {**value, "memory": self.size}
+        self.mark = self.size
+        return {**value, "scratch": {"offset": scratch, "bytes": SCRATCH}, "classes": classes, "memory": self.size}
 
     def score(self, photo, views, padding=0):
         """Answer and scores."""
@@ -120,6 +129,14 @@ class FakeHost:
                     "tilt_sigma_rad": 0.002, "alignment": None}
         return self.call(photo, estimate=estimate, views=self.stack([self.world.view(pose)]))
 
+    def segment(self, photo):
+        """Answer and labels."""
+        labels = self.lend(np.full(photo.shape[:2], 255, "u1"))
+        call = self._begun({"photo": self.lend(photo), "labels": labels})
+        self.world = self.world.placeless()
+        answer = self.ask("segment", call)
+        return answer, self.read(labels)
+
     def detect(self, photo, pose):
         return self.ask("detect", self.comparison(photo, pose))
 
@@ -130,6 +147,7 @@ class FakeHost:
         return self.ask("estimate", {"comparison": self.comparison(photo, pose), "regions": listed})
 
     def _serve(self, name, value):
+        """Answers a request. Like the host, it takes back what it lent with the answer before."""
         if name in ("log", "progress"):
             self.noted.append((name, value))
             return
@@ -137,12 +155,17 @@ class FakeHost:
             self.taken += self.read(value["cells"]).tolist() if name == "heat" else value
             self.send("served", {"memory": self.size})
             return
-        answer = getattr(self, f"_{name}")(value)
+        if self.mark is not None:
+            self.size = self.mark
+        try:
+            answer = getattr(self, f"_{name}")(value)
+        except Failed as failure:
+            answer = str(failure)
         self.send(*(("error", {"text": answer}) if isinstance(answer, str) else ("served", {**answer, "memory": self.size})))
 
     def _render(self, value):
         poses = self.read(value["poses"])[:2]
-        return {"views": self.stack(list(self.world.render(poses, value["stride"], value["with_descriptors"])))}
+        return {"views": self.stack(self.world.render(poses, value["stride"], value["with_descriptors"]))}
 
     def _compare_views(self, value):
         def listed(sets):
@@ -172,8 +195,8 @@ class FakeHost:
         height_m = self.world.ground_height(value["point"])
         return {} if height_m is None else {"height_m": height_m}
 
-    def _grid_from_wgs84(self, _):
-        return "the toy host does not offer grid_from_wgs84"
+    def _grid_from_wgs84(self, value):
+        return {"position": self.world.grid_from_wgs84(value["position"])}
 
 
 def python(source):

@@ -9,7 +9,8 @@ import unittest
 
 import numpy as np
 
-from resurvey_plugin import Pose, Region, toy
+from resurvey_plugin import Failed, Pose, Region, toy
+from resurvey_plugin.plugin import Settings
 
 from .fake import PACKAGE, FakeHost, python
 
@@ -118,6 +119,12 @@ class WhatGoesWrong(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertIn("Traceback", last_words)
 
+    def test_a_text_that_is_no_unicode_leaves_the_wire_whole(self):
+        world = toy.street(40, 30)
+        with started("    def score(self, photo, view):\n        raise Failed('weights ' + chr(0xDC80))\n", world) as host:
+            answer, _ = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])
+            self.assertEqual(answer, ("failed", {"text": "weights ?"}))
+
     def test_prints_and_readers_leave_the_wire_alone(self):
         world = toy.street(40, 30)
         view = world.view(toy.POSE)
@@ -148,6 +155,54 @@ class WhatGoesWrong(unittest.TestCase):
         with started("    def score(self, photo, view):\n        exit(0)\n", world) as host:
             self.assertEqual(host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0][0], "panicked")
 
+    def test_a_score_that_is_no_number_is_told_with_what_it_is(self):
+        world = toy.street(40, 30)
+        bodies = {"pass": "expected score to return a number from 0 to 1, found NoneType",
+                  "return (photo == view.labels).mean(axis=0)": "found an array of shape (40,)",
+                  "return 'high'": "found str"}
+        for body, words in bodies.items():
+            with self.subTest(body), started(f"    def score(self, photo, view):\n        {body}\n", world) as host:
+                name, value = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[0]
+                self.assertEqual(name, "panicked")
+                self.assertIn(words, value["text"])
+
+    def test_what_is_no_region_or_proposal_is_told_with_what_it_is(self):
+        world = toy.street(40, 30)
+        photo = world.photo(toy.POSE).labels
+        calls = {"detect(self, comparison, host)": "Region", "estimate(self, comparison, regions, host)": "Reject"}
+        for call, what in calls.items():
+            for body, found in (("pass", "NoneType"), ("return [comparison.photo != 3]", "ndarray"), ("return 7", "int")):
+                with self.subTest(call=call, body=body), started(f"    def {call}:\n        {body}\n", world) as host:
+                    name, value = host.detect(photo, toy.POSE) if "detect" in call else host.estimate(photo, toy.POSE, [])
+                    self.assertEqual((name, host.taken), ("panicked", []))
+                    self.assertIn(what, value["text"])
+                    self.assertIn(f"found {found}", value["text"])
+
+    def test_a_mask_that_is_larger_than_the_photo_touches_no_memory(self):
+        world = toy.street(40, 30)
+        body = "    def detect(self, comparison, host):\n        return [Region(0, 1, 0, 0, np.ones((3000, 3000)))]\n"
+        with started(body, world) as host:
+            name, value = host.detect(world.photo(toy.POSE).labels, toy.POSE)
+            self.assertEqual(name, "panicked")
+            self.assertIn("expected a mask within the photo of 30 × 40 pixels, found 3000 × 3000", value["text"])
+
+    def test_an_author_s_own_init_has_the_settings_too(self):
+        world = toy.street(40, 30)
+        with started('''
+    def __init__(self, settings):
+        self.half = 0.5
+    def score(self, photo, view):
+        return self.half * self.settings.void / 255
+''', world) as host:
+            self.assertEqual(host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])[1].tolist(), [0.5])
+
+    def test_classes_that_cannot_be_are_not_ignored_in_silence(self):
+        world = toy.street(40, 30)
+        body = "    def search(self, photo, host):\n        host.compare_views([photo.prior.pose], ignored_in_photo=[300])\n"
+        with started(body, world) as host:
+            name, value = host.search(world.photo(toy.POSE))
+            self.assertIn("expected indices of classes from 0 to 254, found 300", value["text"])
+
     def test_settings_that_the_class_does_not_have_are_named(self):
         world = toy.street(40, 30)
         with started("    def score(self, photo, view):\n        return self.settings.viod\n", world) as host:
@@ -164,7 +219,7 @@ class WhatGoesWrong(unittest.TestCase):
         for body in ("    pass", "    def score(self, photo, view): ...\n    def detect(self, comparison, host): ..."):
             run = subprocess.run(python(HEAD + body + "\nmain(Plug)\n"), env={**os.environ, "PYTHONPATH": PACKAGE},
                                  capture_output=True, text=True)
-            self.assertIn("Plug needs score, search, detect or estimate, found", run.stderr)
+            self.assertIn("Plug needs score, search, detect, estimate or segment, found", run.stderr)
 
 
 class AMatcherThatSearches(unittest.TestCase):
@@ -210,6 +265,35 @@ class AMatcherThatSearches(unittest.TestCase):
                 ("log", {"level": "warning", "text": "the toy host does not offer grid_from_wgs84"}), ("progress", 0.5)])
             self.assertEqual(len(host.taken), 100_000)
             self.assertEqual(host.taken[-1], [*toy.POSE[:2], 0.75])
+
+    def test_a_view_stays_what_it_was_while_other_services_are_used(self):
+        with started('''
+    def search(self, photo, host):
+        from resurvey_plugin import toy
+        world, pose = toy.street(40, 30), photo.prior.pose
+        poses = [pose._replace(easting_m=pose.easting_m + aside) for aside in range(5)]
+        for pose, view in zip(poses, host.render(poses)):
+            host.pixel_rays(pose, np.full((2000, 2), 7.0))
+            assert np.array_equal(view.labels, world.view(pose).labels), pose
+            assert np.array_equal(view.origin, pose.position), pose
+        return Localization(pose, 1.0, np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertEqual(host.search(host.world.photo(toy.POSE))[0], "done")
+
+    def test_wrong_poses_are_told_where_they_are_asked_for(self):
+        with started("    def search(self, photo, host):\n        host.render([(1, 2, 3)])\n", toy.street(40, 30)) as host:
+            name, value = host.search(host.world.photo(toy.POSE))
+            self.assertIn("expected rows of 6 numbers", value["text"])
+
+    def test_a_long_line_of_the_log_is_cut_and_the_wire_stays_whole(self):
+        with started('''
+    def search(self, photo, host):
+        host.log("ä" * 2_000_000)
+        return Localization(photo.prior.pose, 1.0, np.eye(3))
+''', toy.street(40, 30)) as host:
+            self.assertEqual(host.search(host.world.photo(toy.POSE))[0], "done")
+            (_, words), = host.noted
+            self.assertEqual(words["text"], "ä" * 8192)
 
     def test_many_rows_go_in_as_many_messages_as_the_scratch_needs(self):
         with started('''
@@ -289,44 +373,169 @@ class DetectorAndEstimator(unittest.TestCase):
             self.assertEqual(host.taken, [])
 
 
+class ASegmenter(unittest.TestCase):
+    def segment(self, body, world=None):
+        world = world or toy.street(40, 30)
+        with started("    def segment(self, photo, host):\n        " + body + "\n", world) as host:
+            return host.segment(world.picture(toy.POSE))
+
+    def test_labels_of_any_whole_type_arrive(self):
+        world = toy.street(40, 30)
+        nearest = ("colours = np.array([one.colour for one in host.classes])\n        "
+                   "return np.abs(photo[:, :, None].astype(int) - colours).sum(axis=-1).argmin(axis=-1)")
+        answer, labels = self.segment(nearest, world)
+        self.assertEqual(answer, ("done", {}))
+        np.testing.assert_array_equal(labels, world.view(toy.POSE).labels)
+
+    def test_what_is_no_image_of_labels_is_told(self):
+        for body, words in (("return photo", "shape (30, 40, 3)"), ("return photo[:-1, :, 0]", "shape (29, 40)"),
+                            ("return photo[..., 0] / 255", "type float64"), ("return None", "type object"),
+                            ("return np.full((30, 40), -1)", "found -1 to -1"), ("return np.full((30, 40), 256)", "256")):
+            with self.subTest(body):
+                (name, value), labels = self.segment(body)
+                self.assertEqual(name, "panicked")
+                self.assertIn(words, value["text"])
+                self.assertTrue((labels == 255).all())
+
+    def test_the_photo_cannot_be_written_to_and_there_is_no_map(self):
+        self.assertIn("read-only", self.segment("photo[0] = 1")[0][1]["text"])
+        answer, _ = self.segment("host.ground_height((0, 0, 0))")
+        self.assertEqual(answer[0], "failed")
+        self.assertIn("a segmenter has no map", answer[1]["text"])
+
+
+class Records(unittest.TestCase):
+    def test_a_setting_may_be_called_as_what_a_dict_has(self):
+        settings = Settings({"items": 3, "values": 0.5, "get": "a"})
+        self.assertEqual((settings.items, settings.values, settings.get, settings["items"]), (3, 0.5, "a", 3))
+        self.assertEqual({**settings}, {"items": 3, "values": 0.5, "get": "a"})
+        self.assertEqual(sorted(Settings({"void": 1}).items()), [("void", 1)])
+
+    def test_a_region_of_parts_has_all_its_pixels(self):
+        region = Region.of(np.array([[0.0, 0.25], [0.0, 1.0]]), 0, 1)
+        self.assertEqual((region.pixels, region.left, region.mask.dtype), (2, 1, np.uint8))
+        with self.assertRaisesRegex(ValueError, "expected a mask of rows and columns"):
+            Region.of(np.ones(7), 0, 1)
+
+    def test_a_class_is_found_by_its_name(self):
+        world = toy.street(40, 30)
+        self.assertEqual(world.class_named("banner").index, toy.BANNER)
+        with self.assertRaisesRegex(Failed, "expected a map with a class tree, found stone, glass"):
+            world.placeless().class_named("tree")
+        with started("    def search(self, photo, host):\n        raise Failed(host.class_named('chair').kind)\n", world) as host:
+            self.assertEqual(host.search(world.photo(toy.POSE)), ("failed", {"text": "dynamic"}))
+
+
 class TheOneFile(unittest.TestCase):
-    def build(self, directory, source):
-        path = os.path.join(directory, "plug.py")
+    def setUp(self):
+        place = tempfile.TemporaryDirectory()
+        self.addCleanup(place.cleanup)
+        self.directory = place.name
+
+    def write(self, name, source):
+        path = os.path.join(self.directory, name)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
         with open(path, "w", encoding="utf-8") as file:
             file.write(source)
-        return subprocess.run([sys.executable, "-m", "resurvey_plugin", "build", path], capture_output=True, text=True,
-                              env={**os.environ, "PYTHONPATH": PACKAGE})
+        return path
+
+    def build(self, source, *options, name="plug.py", python=sys.executable):
+        # A virtual environment made in another one does not have its NumPy.
+        paths = os.pathsep.join([PACKAGE, os.path.dirname(os.path.dirname(np.__file__))])
+        return subprocess.run([python, "-m", "resurvey_plugin", "build", *options, self.write(name, source)],
+                              capture_output=True, text=True, env={**os.environ, "PYTHONPATH": paths})
+
+    def built(self, source, *options):
+        run = self.build(source, *options)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return run.stdout.strip()
+
+    def refusal(self, source, *options, name="plug.py"):
+        run = self.build(source, *options, name=name)
+        self.assertEqual((run.returncode, "Traceback" in run.stderr), (1, False), run.stderr)
+        return run.stderr
+
+    def score_alone(self, built):
+        """What the file scores where nothing else of the author's is."""
+        world = toy.street(40, 30)
+        with tempfile.TemporaryDirectory() as elsewhere:
+            path = os.path.join(elsewhere, os.path.basename(built))
+            os.rename(built, path)
+            with FakeHost([sys.executable, path], package=elsewhere) as host:
+                self.assertEqual(host.raw()[0], "hello")
+                self.assertEqual(host.create(), ("done", {}))
+                answer, scores = host.score(world.view(toy.POSE).labels, [world.view(toy.POSE)])
+                self.assertEqual(answer, ("done", {}))
+                return scores[0]
 
     def test_it_runs_alone_and_declares_itself_before_it_runs(self):
-        source = SCORER.replace("\nmain(", "\nif __name__ == '__main__':\n    main(")
-        with tempfile.TemporaryDirectory() as directory:
-            run = self.build(directory, source)
-            self.assertEqual((run.returncode, run.stderr), (0, ""))
-            path = run.stdout.strip()
-            with open(path, "rb") as file:
-                first, second = file.readline(), file.readline()
-            self.assertEqual(first, b"#!/usr/bin/env python3\n")
-            declared = json.loads(second.removeprefix(b"# resurvey-plugin: "))
-            os.remove(os.path.join(directory, "plug.py"))
-            host = FakeHost([sys.executable, path], package=directory)
+        path = self.built(SCORER.replace("\nmain(", "\nif __name__ == '__main__':\n    main("))
+        with open(path, "rb") as file:
+            file.readline()
+            second = file.readline()
+        declared = json.loads(second.replace(b"# resurvey-plugin: ", b""))
+        os.remove(os.path.join(self.directory, "plug.py"))
+        with FakeHost([sys.executable, path], package=self.directory) as host:
             said = host.raw()[1]
             self.assertEqual({key: said[key] for key in declared}, declared)
             self.assertEqual(host.create({"void": 255}), ("done", {}))
-            host.close()
 
     def test_the_same_source_gives_the_same_bytes(self):
-        source, files = SCORER.replace("main(Plug)", ""), []
+        files = []
         for _ in range(2):
-            with tempfile.TemporaryDirectory() as directory:
-                with open(self.build(directory, source).stdout.strip(), "rb") as file:
-                    files.append(file.read())
+            with open(self.built(SCORER.replace("main(Plug)", "")), "rb") as file:
+                files.append(file.read())
         self.assertEqual(files[0], files[1])
 
-    def test_a_file_without_a_plugin_is_refused(self):
-        with tempfile.TemporaryDirectory() as directory:
-            run = self.build(directory, "x = 1\n")
-            self.assertEqual(run.returncode, 1)
-            self.assertIn("expected one class made from Plugin, found none", run.stderr)
+    def test_a_dataclass_with_postponed_annotations_is_built(self):
+        source = ("from __future__ import annotations\nfrom dataclasses import dataclass\nimport typing\n"
+                  "@dataclass\nclass Weights:\n    half: typing.ClassVar[float] = 0.5\n    more: float = 0.25\n" + HEAD +
+                  "    def score(self, photo, view):\n        return Weights().more + Weights.half\n")
+        self.assertEqual(self.score_alone(self.built(source)), 0.75)
+
+    def test_a_class_that_others_are_made_from_is_no_second_plugin(self):
+        source = HEAD.replace("class Plug(Plugin)", "class Base(Plugin)") + (
+            "    def score(self, photo, view):\n        return self.VALUE\n"
+            "class Plug(Base):\n    NAME, VALUE = 'plug-two', 0.25\n")
+        path = self.built(source)
+        self.assertEqual(os.path.basename(path), "resurvey-plugin-plug-two")
+        self.assertEqual(self.score_alone(path), 0.25)
+
+    def test_modules_beside_it_that_it_imports_go_along(self):
+        self.write("weights.py", "HALF = 0.5\n")
+        self.write("model/__init__.py", "")
+        self.write("model/net.py", "from weights import HALF\ndef run():\n    return HALF / 2\n")
+        body = "    def score(self, photo, view):\n        return model.net.run()\n"
+        run = self.build("import model.net\n" + HEAD + body)
+        self.assertEqual(run.stderr, "with model/__init__.py, model/net.py, weights.py\n")
+        self.assertEqual(self.score_alone(run.stdout.strip()), 0.25)
+
+    def test_modules_that_are_imported_later_are_named(self):
+        self.write("late.py", "VALUE = 0.125\n")
+        source = HEAD + "    def score(self, photo, view):\n        import late\n        return late.VALUE\n"
+        self.assertEqual(self.score_alone(self.built(source, "--with", os.path.join(self.directory, "late.py"))), 0.125)
+        self.assertIn("expected a Python file below", self.refusal(source, "--with", __file__))
+
+    def test_a_virtual_environment_builds_for_itself(self):
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip",
+                        os.path.join(self.directory, "venv")], check=True)
+        python = os.path.join(self.directory, "venv", "bin", "python3")
+        run = self.build(SCORER.replace("main(Plug)", ""), python=python)
+        with open(run.stdout.strip(), "rb") as file:
+            self.assertEqual(file.readline().decode(), f"#!{python}\n")
+
+    def test_an_interpreter_that_no_first_line_can_name_is_refused(self):
+        spaced = os.path.join(self.directory, "my python")
+        os.symlink(sys.executable, spaced)
+        self.assertIn("expected an interpreter without spaces in its path", self.refusal(SCORER, "--python", spaced))
+        self.assertIn("expected the path of an interpreter", self.refusal(SCORER, "--python", "/no/python3"))
+
+    def test_what_is_no_one_plugin_is_refused(self):
+        self.assertIn("expected one class made from Plugin that has a NAME, found none", self.refusal("x = 1\n"))
+        two = HEAD + "    def score(self, photo, view): ...\nclass Other(Plugin):\n    NAME = 'other'\n"
+        self.assertIn("found Plug, Other", self.refusal(two))
+        self.assertIn("below if __name__ ==", self.refusal(SCORER))
+        self.assertIn("json.py hides a module", self.refusal(SCORER, name="json.py"))
 
 
 if __name__ == "__main__":

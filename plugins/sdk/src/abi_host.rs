@@ -104,6 +104,7 @@ unsafe fn copy_view(view: *const abi::View) -> Result<ViewImages, Error> {
         range_m: copy(view.range_m),
         points: copy(view.points),
         features: copy(view.features),
+        feature_table: view.feature_table.to_vec(),
     })
 }
 

@@ -35,6 +35,12 @@ impl<'a, T: Copy> ImageRef<'a, T> {
         &self.data[start..start + self.width as usize]
     }
 
+    /// The rows from the top, as [`row`](Self::row) gives each.
+    pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
+        let image = *self;
+        (0..image.height).map(move |v| image.row(v))
+    }
+
     /// The value at column `u`, row `v`; panics outside.
     pub fn at(&self, u: u32, v: u32) -> T {
         self.row(v)[u as usize]
@@ -75,6 +81,27 @@ pub struct ViewImages {
     pub points: Vec<[f32; 3]>,
     /// Feature per pixel.
     pub features: Vec<u32>,
+    /// The descriptors of the scene, which `features` points into.
+    pub feature_table: Vec<ViewFeature>,
+}
+
+impl ViewImages {
+    /// The same as the host lends it to a matcher; panics when a raster has not `width` × `height` values.
+    pub fn view(&self) -> View<'_> {
+        View {
+            origin: self.origin,
+            labels: self.raster(&self.labels),
+            range_m: self.raster(&self.range_m),
+            points: self.raster(&self.points),
+            features: self.raster(&self.features),
+            feature_table: &self.feature_table,
+        }
+    }
+
+    fn raster<'a, T: Copy>(&self, values: &'a [T]) -> ImageRef<'a, T> {
+        let image = ImageRef::new(values, self.width, self.height, self.width as usize);
+        image.expect("invariant: every raster has width × height values")
+    }
 }
 
 /// Photo and view of the same pose, side by side.

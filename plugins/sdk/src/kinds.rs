@@ -6,7 +6,8 @@ use resurvey_schema::service::Prior;
 use resurvey_schema::{ChangeRegion, Intrinsics, Localization, Proposal};
 use serde::de::DeserializeOwned;
 
-/// Why a plugin could not answer; the text says what was expected and what was found.
+/// Why a plugin could not answer; the text says what was expected and what was found. `"…".into()` and `?` on a `Result`
+/// with a text make one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error(pub String);
 
@@ -17,6 +18,18 @@ impl std::fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+impl From<String> for Error {
+    fn from(text: String) -> Self {
+        Self(text)
+    }
+}
+
+impl From<&str> for Error {
+    fn from(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
 
 /// What every plugin has. `NAME` is lower case with dashes; `SETTINGS` is a flat JSON schema whose `default`s the host
 /// fills in, so that `Settings` is always complete.

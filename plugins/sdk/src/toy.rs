@@ -2,6 +2,7 @@
 //! ray per pixel in `f64`, for a pinhole camera. Slow and simple on purpose: it is the oracle, not the renderer.
 
 mod camera;
+mod compare;
 mod host;
 pub mod noise;
 mod scene;
@@ -10,6 +11,7 @@ pub mod trial;
 pub use camera::ToyCamera;
 pub use host::{ToyCapture, ToyHost};
 pub use scene::{Paint, Rectangle, ToyScene};
+pub use trial::create;
 
 #[cfg(test)]
 mod tests;

@@ -52,24 +52,15 @@ impl Scorer for Skyline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use resurvey_plugin::schema::GridPoint;
+    use resurvey_plugin::toy::trial::Labels;
 
     const SKY: u8 = 6;
     const FOLIAGE: u8 = 7;
     const VOID: u8 = 255;
 
     fn score(ignore_foliage: bool, photo: [u8; 6], view: [u8; 6]) -> f64 {
-        let image = |labels| ImageRef::new(labels, 3, 2, 3).unwrap();
-        let view = View {
-            origin: GridPoint::new(0.0, 0.0, 0.0),
-            labels: image(&view),
-            range_m: ImageRef::new(&[0.0; 6], 3, 2, 3).unwrap(),
-            points: ImageRef::new(&[[0.0; 3]; 6], 3, 2, 3).unwrap(),
-            features: ImageRef::new(&[0; 6], 3, 2, 3).unwrap(),
-            feature_table: &[],
-        };
-        let settings = Settings { sky_class: SKY, ignore_foliage, foliage_class: FOLIAGE };
-        Skyline::create(settings).unwrap().score(image(&photo), &view).unwrap()
+        let mut skyline = Skyline { settings: Settings { sky_class: SKY, ignore_foliage, foliage_class: FOLIAGE } };
+        Labels::new(3, &photo).score(&mut skyline, &Labels::new(3, &view)).unwrap()
     }
 
     #[test]

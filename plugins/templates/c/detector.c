@@ -7,8 +7,6 @@
 #include "resurvey_plugin.h"
 #include <stdlib.h>
 
-#define VOID_CLASS 255
-
 /* The host checks settings against this schema, fills in what the user did not say, and hands over all of them. */
 static const char schema[] = "{\"type\": \"object\", \"additionalProperties\": false, \"properties\": {"
                              "\"least_px\": {\"type\": \"integer\", \"default\": 100, \"minimum\": 1,"
@@ -18,25 +16,10 @@ struct rsv_instance {
   uint32_t least_px;
 };
 
-/* The number behind "name": in the settings. They are sorted and without spaces, so a search is enough. */
-static double number(rsv_text settings, const char *name) {
-  size_t length = strlen(name);
-  for (size_t i = 0; i + length + 3 < settings.length; i++)
-    if (settings.data[i] == '"' && !memcmp(settings.data + i + 1, name, length) &&
-        !memcmp(settings.data + i + 1 + length, "\":", 2)) {
-      /* The text has no zero at its end, which strtod needs. */
-      char digits[32] = {0};
-      size_t start = i + length + 3, left = settings.length - start;
-      memcpy(digits, settings.data + start, left < sizeof digits - 1 ? left : sizeof digits - 1);
-      return strtod(digits, NULL);
-    }
-  return 0;
-}
-
 static rsv_status create(rsv_text settings, rsv_instance **instance, rsv_error *error) {
   rsv_instance *made = malloc(sizeof *made);
   if (!made) return rsv_fail(error, "out of memory");
-  made->least_px = (uint32_t)number(settings, "least_px");
+  made->least_px = (uint32_t)rsv_setting_number(settings, "least_px");
   *instance = made;
   return RSV_OK;
 }
@@ -44,13 +27,12 @@ static rsv_status create(rsv_text settings, rsv_instance **instance, rsv_error *
 static void destroy(rsv_instance *instance) { free(instance); }
 
 static uint8_t class_at(const rsv_image *image, uint32_t u, uint32_t v) {
-  /* Rows may be padded: step by row_bytes, not by the width. */
-  return ((const uint8_t *)image->data + v * image->row_bytes)[u];
+  return ((const uint8_t *)rsv_row(image, v))[u];
 }
 
 static int differs(const rsv_comparison *comparison, uint32_t u, uint32_t v) {
   uint8_t after = class_at(&comparison->photo, u, v);
-  return after != VOID_CLASS && after != class_at(&comparison->view->labels, u, v);
+  return after != RSV_VOID && after != class_at(&comparison->view->labels, u, v);
 }
 
 /* The pixels of one region, and those that are still to be looked at. */
@@ -72,7 +54,7 @@ static void look_at(const rsv_comparison *comparison, uint32_t u, uint32_t v, ui
 
 /* Collects the region that hangs together with (u, v), and tells the host when it is large enough. */
 static rsv_status region_from(const rsv_comparison *comparison, uint32_t u, uint32_t v, uint32_t least_px,
-                              found *region, const rsv_results *results) {
+                              found *region, const rsv_results *results, rsv_error *error) {
   uint32_t width = comparison->photo.width, height = comparison->photo.height;
   rsv_region told = {.size = sizeof told,
                      .class_before = class_at(&comparison->view->labels, u, v),
@@ -98,7 +80,7 @@ static rsv_status region_from(const rsv_comparison *comparison, uint32_t u, uint
   told.pixels = (uint32_t)region->count;
   told.mask_length = (size_t)columns * (told.bottom - told.top);
   uint8_t *mask = calloc(told.mask_length, 1);
-  if (!mask) return RSV_FAILED;
+  if (!mask) return rsv_fail(error, "out of memory");
   for (size_t i = 0; i < region->count; i++) {
     uint32_t x = region->pixels[i] % width, y = region->pixels[i] / width;
     mask[(size_t)(y - told.top) * columns + (x - told.left)] = 1;
@@ -107,7 +89,7 @@ static rsv_status region_from(const rsv_comparison *comparison, uint32_t u, uint
   /* The host copies at once. */
   rsv_status status = results->region(results->context, &told);
   free(mask);
-  return status;
+  return status == RSV_OK ? RSV_OK : rsv_fail(error, "the host did not take a region");
 }
 
 static rsv_status detect(rsv_instance *instance, const rsv_services *services, const rsv_comparison *comparison,
@@ -121,10 +103,8 @@ static rsv_status detect(rsv_instance *instance, const rsv_services *services, c
     /* Return within 200 ms of a cancel. */
     if (rsv_cancelled(services)) status = RSV_CANCELLED;
     for (uint32_t u = 0; u < width && status == RSV_OK; u++)
-      if (!region.seen[(size_t)v * width + u] && differs(comparison, u, v)) {
-        status = region_from(comparison, u, v, instance->least_px, &region, results);
-        if (status != RSV_OK) status = rsv_fail(error, "the host did not take a region");
-      }
+      if (!region.seen[(size_t)v * width + u] && differs(comparison, u, v))
+        status = region_from(comparison, u, v, instance->least_px, &region, results, error);
   }
   free(region.pixels);
   free(region.seen);

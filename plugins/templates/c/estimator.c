@@ -33,26 +33,11 @@ static vec cross(vec a, vec b) {
   return (vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/* The number behind "name": in the settings. They are sorted and without spaces, so a search is enough. */
-static double number(rsv_text settings, const char *name) {
-  size_t length = strlen(name);
-  for (size_t i = 0; i + length + 3 < settings.length; i++)
-    if (settings.data[i] == '"' && !memcmp(settings.data + i + 1, name, length) &&
-        !memcmp(settings.data + i + 1 + length, "\":", 2)) {
-      /* The text has no zero at its end, which strtod needs. */
-      char digits[32] = {0};
-      size_t start = i + length + 3, left = settings.length - start;
-      memcpy(digits, settings.data + start, left < sizeof digits - 1 ? left : sizeof digits - 1);
-      return strtod(digits, NULL);
-    }
-  return 0;
-}
-
 static rsv_status create(rsv_text settings, rsv_instance **instance, rsv_error *error) {
   rsv_instance *made = malloc(sizeof *made);
   if (!made) return rsv_fail(error, "out of memory");
-  made->plane_m = number(settings, "plane_m");
-  made->range_m = number(settings, "range_m");
+  made->plane_m = rsv_setting_number(settings, "plane_m");
+  made->range_m = rsv_setting_number(settings, "range_m");
   *instance = made;
   return RSV_OK;
 }
@@ -61,8 +46,7 @@ static void destroy(rsv_instance *instance) { free(instance); }
 
 /* Offset of the surface in a pixel from the view's origin; NaN where there is none. */
 static vec point_at(const rsv_view *view, uint32_t u, uint32_t v) {
-  /* Rows may be padded: step by row_bytes, not by the width. */
-  const float *point = (const float *)((const char *)view->points.data + v * view->points.row_bytes) + 3 * (size_t)u;
+  const float *point = (const float *)rsv_row(&view->points, v) + 3 * (size_t)u;
   return (vec){point[0], point[1], point[2]};
 }
 
@@ -74,7 +58,7 @@ static int is_inside(const rsv_region *region, uint32_t u, uint32_t v) {
 /* Whether the view shows a descriptor of the region's class here. */
 static int shows_descriptor(const rsv_comparison *comparison, const rsv_region *region, uint32_t u, uint32_t v) {
   const rsv_view *view = comparison->view;
-  uint32_t feature = ((const uint32_t *)((const char *)view->features.data + v * view->features.row_bytes))[u];
+  uint32_t feature = ((const uint32_t *)rsv_row(&view->features, v))[u];
   return feature && feature <= view->feature_count && view->feature_table[feature - 1].class_index == region->class_before;
 }
 
@@ -196,7 +180,7 @@ static double furthest_m(const rsv_comparison *comparison, const rsv_region *reg
 
 static int is_material(const rsv_services *services, uint8_t class_index) {
   for (size_t i = 0; i < services->class_count; i++)
-    if (services->classes[i].index == class_index) return services->classes[i].kind == 0;
+    if (services->classes[i].index == class_index) return services->classes[i].kind == RSV_CLASS_MATERIAL;
   return 0;
 }
 

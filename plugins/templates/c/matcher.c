@@ -16,25 +16,10 @@ struct rsv_instance {
   uint8_t void_class;
 };
 
-/* The number behind "name": in the settings. They are sorted and without spaces, so a search is enough. */
-static double number(rsv_text settings, const char *name) {
-  size_t length = strlen(name);
-  for (size_t i = 0; i + length + 3 < settings.length; i++)
-    if (settings.data[i] == '"' && !memcmp(settings.data + i + 1, name, length) &&
-        !memcmp(settings.data + i + 1 + length, "\":", 2)) {
-      /* The text has no zero at its end, which strtod needs. */
-      char digits[32] = {0};
-      size_t start = i + length + 3, left = settings.length - start;
-      memcpy(digits, settings.data + start, left < sizeof digits - 1 ? left : sizeof digits - 1);
-      return strtod(digits, NULL);
-    }
-  return 0;
-}
-
 static rsv_status create(rsv_text settings, rsv_instance **instance, rsv_error *error) {
   rsv_instance *made = malloc(sizeof *made);
   if (!made) return rsv_fail(error, "out of memory");
-  made->void_class = (uint8_t)number(settings, "void");
+  made->void_class = (uint8_t)rsv_setting_number(settings, "void");
   *instance = made;
   return RSV_OK;
 }
@@ -46,9 +31,8 @@ static rsv_status score(rsv_instance *instance, const rsv_image *photo, const rs
                         rsv_error *error) {
   size_t same = 0, compared = 0;
   for (uint32_t v = 0; v < photo->height; v++) {
-    /* Rows may be padded: step by row_bytes, not by the width. */
-    const uint8_t *in_photo = (const uint8_t *)photo->data + v * photo->row_bytes;
-    const uint8_t *in_view = (const uint8_t *)view->labels.data + v * view->labels.row_bytes;
+    /* Rows may be padded: never data + v * width. */
+    const uint8_t *in_photo = (const uint8_t *)rsv_row(photo, v), *in_view = (const uint8_t *)rsv_row(&view->labels, v);
     for (uint32_t u = 0; u < photo->width; u++) {
       if (in_photo[u] == instance->void_class) continue;
       compared++;

@@ -36,10 +36,11 @@ def connected(pairs, host):
     left = dict.fromkeys(np.flatnonzero(flat >= 0).tolist())
     numbers = {index: int(flat[index]) for index in left}
     while left:
-        host.check_cancelled()
         start, _ = left.popitem()
         pixels = [start]
-        for index in pixels:
+        for count, index in enumerate(pixels):
+            if count % 4096 == 0:  # A large region takes longer than 200 ms.
+                host.check_cancelled()
             beside = [index - width, index + width]
             beside += [index - 1] if index % width else []
             beside += [index + 1] if (index + 1) % width else []

@@ -24,7 +24,7 @@ impl Plugin for MyDetector {
     const SETTINGS: &'static str = r#"{
         "type": "object", "additionalProperties": false,
         "properties": {
-            "least_px": {"type": "integer", "default": 100, "minimum": 1,
+            "least_px": {"type": "integer", "default": 100, "minimum": 1, "maximum": 1000000,
                          "description": "smallest region, pixels"}
         }
     }"#;
@@ -40,9 +40,9 @@ impl Detector for MyDetector {
         let mut difference = Difference::new(comparison);
         let mut regions = Vec::new();
         for v in 0..difference.height {
-            // Return soon after a cancel: the answer is not used.
+            // Within 200 ms of a cancel: a part of the regions must not be taken for all of them.
             if host.cancelled() {
-                break;
+                return Err("cancelled".into());
             }
             for u in 0..difference.width {
                 if let Some(pair) = difference.pairs[difference.index(u, v)] {
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use resurvey_plugin::PoseEstimate;
     use resurvey_plugin::schema::{GridPoint, Pose};
-    use resurvey_plugin::toy::{Paint, ToyCamera, ToyHost, ToyScene};
+    use resurvey_plugin::toy::{Paint, ToyCamera, ToyHost, ToyScene, create};
 
     const STONE: ClassId = ClassId(0);
     const BANNER: ClassId = ClassId(3);
@@ -137,29 +137,35 @@ mod tests {
         ToyHost::new(scene, camera)
     }
 
-    fn detect(photo: &ToyHost) -> Vec<ChangeRegion> {
+    fn detect(map: &ToyHost, photo: &ToyHost) -> Result<Vec<ChangeRegion>, Error> {
         let pose = Pose { position: GridPoint::new(0.0, 0.0, 1.6), yaw_rad: 0.0, pitch_rad: 0.0, roll_rad: 0.0 };
         let estimate =
             PoseEstimate { pose, covariance: [[0.0; 3]; 3], height_sigma_m: 0.0, tilt_sigma_rad: 0.0, alignment: None };
-        let capture = map().capture(photo.labels(&pose), estimate);
-        let settings = serde_json::from_str(r#"{"least_px": 20}"#).unwrap();
-        MyDetector::create(settings).unwrap().detect(&map(), &capture.comparison()).unwrap()
+        let capture = map.capture(photo.labels(&pose), estimate);
+        create::<MyDetector>(r#"{"least_px": 20}"#)?.detect(map, &capture.comparison())
     }
 
     #[test]
     fn equal_images_give_no_region() {
-        assert_eq!(detect(&map()), []);
+        assert_eq!(detect(&map(), &map()), Ok(vec![]));
     }
 
     #[test]
     fn a_banner_on_the_wall_is_one_region_where_the_pinhole_puts_it() {
         let mut photo = map();
         photo.scene.add_wall([-2.0, 9.999], [2.0, 9.999], [2.6, 3.6], Paint::Plain(BANNER));
-        let regions = detect(&photo);
+        let regions = detect(&map(), &photo).unwrap();
         let [region] = &regions[..] else { panic!("expected one region, found {regions:?}") };
         assert_eq!((region.class_before, region.class_after), (STONE, BANNER));
         // 80 px · (±2, −1…−2 m) / 10 m from the principal point at (80, 60).
         assert_eq!(region.bounds, PixelBox { left: 64, top: 44, right: 96, bottom: 52 });
         assert_eq!(region.pixels, 32 * 8);
+    }
+
+    #[test]
+    fn a_part_of_the_regions_is_no_answer_after_a_cancel() {
+        let mut cancelled = map();
+        cancelled.is_cancelled = true;
+        assert!(detect(&cancelled, &map()).is_err());
     }
 }

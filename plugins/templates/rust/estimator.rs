@@ -50,9 +50,9 @@ impl Estimator for MyEstimator {
     ) -> Result<Vec<Proposal>, Error> {
         let mut proposals = Vec::new();
         for (index, region) in regions.iter().enumerate() {
-            // Return soon after a cancel: the answer is not used.
+            // Within 200 ms of a cancel: a part of the proposals must not be taken for all of them.
             if host.cancelled() {
-                break;
+                return Err("cancelled".into());
             }
             proposals.push(self.meaning(host, comparison, index as u32, region));
         }
@@ -289,7 +289,7 @@ mod tests {
     use super::*;
     use resurvey_plugin::PoseEstimate;
     use resurvey_plugin::schema::{ClassId, PixelBox, Pose};
-    use resurvey_plugin::toy::{Paint, ToyCamera, ToyHost, ToyScene};
+    use resurvey_plugin::toy::{Paint, ToyCamera, ToyHost, ToyScene, create};
 
     const STONE: ClassId = ClassId(0);
     const BANNER: ClassId = ClassId(3);
@@ -308,7 +308,7 @@ mod tests {
         ToyHost::new(scene, ToyCamera::intrinsics(640, 480, 90.0))
     }
 
-    fn estimate(map: &ToyHost, photo: &ToyHost, before: ClassId, after: ClassId) -> Proposal {
+    fn estimate(map: &ToyHost, photo: &ToyHost, before: ClassId, after: ClassId) -> Result<Vec<Proposal>, Error> {
         // Obliquely: a wall turned away must not come out shorter.
         let pose = Pose { position: GridPoint::new(2.0, 0.0, 1.6), yaw_rad: -0.2, pitch_rad: 0.1, roll_rad: 0.0 };
         let estimate =
@@ -326,10 +326,7 @@ mod tests {
             pixels: mask.iter().map(|inside| u32::from(*inside)).sum(),
             mask,
         };
-        let settings = serde_json::from_str(r#"{"plane_m": 0.2, "range_m": 50}"#).unwrap();
-        let tight = tight(&region);
-        let mut found = MyEstimator::create(settings).unwrap().estimate(map, &comparison, &[tight]).unwrap();
-        found.pop().unwrap()
+        create::<MyEstimator>("{}")?.estimate(map, &comparison, &[tight(&region)])
     }
 
     /// The same region in tight bounds.
@@ -347,9 +344,9 @@ mod tests {
     fn a_banner_of_four_metres_by_one_is_measured_within_two_per_cent() {
         let mut photo = map();
         photo.scene.add_descriptor(Descriptor::Material(banner()));
-        let Proposal::Place { descriptor: Descriptor::Material(found), .. } = estimate(&map(), &photo, STONE, BANNER)
-        else {
-            panic!("not placed")
+        let proposals = estimate(&map(), &photo, STONE, BANNER).unwrap();
+        let [Proposal::Place { descriptor: Descriptor::Material(found), .. }] = &proposals[..] else {
+            panic!("expected one to place, found {proposals:?}")
         };
         let [a, b, _, d] = found.corners;
         assert!((a.plan_distance_m(&b) / 4.0 - 1.0).abs() < 0.01, "width {}", a.plan_distance_m(&b));
@@ -361,10 +358,20 @@ mod tests {
     fn a_banner_that_is_gone_is_removed_where_it_hung() {
         let mut map_with_it = map();
         map_with_it.scene.add_descriptor(Descriptor::Material(banner()));
-        let Proposal::Remove { class, near, .. } = estimate(&map_with_it, &map(), BANNER, STONE) else {
-            panic!("not removed")
+        let proposals = estimate(&map_with_it, &map(), BANNER, STONE).unwrap();
+        let [Proposal::Remove { class, near, .. }] = &proposals[..] else {
+            panic!("expected one to remove, found {proposals:?}")
         };
-        assert_eq!(class, BANNER);
+        assert_eq!(*class, BANNER);
         assert!(near.plan_distance_m(&banner().centre()) < 0.2, "{near:?}");
+    }
+
+    #[test]
+    fn a_part_of_the_proposals_is_no_answer_after_a_cancel() {
+        let mut photo = map();
+        photo.scene.add_descriptor(Descriptor::Material(banner()));
+        let mut cancelled = map();
+        cancelled.is_cancelled = true;
+        assert!(estimate(&cancelled, &photo, STONE, BANNER).is_err());
     }
 }

@@ -64,7 +64,8 @@ impl Declaration {
             abi_major: super::ABI_MAJOR,
             abi_minor: super::ABI_MINOR,
             size: size_of::<Self>() as u32,
-            min_host_minor: 0,
+            // A host of minor 0 does not know the kind.
+            min_host_minor: (kind == super::KIND_SEGMENTER) as u16,
             kind,
             flags: 0,
             reserved: [0; 8],

@@ -22,8 +22,9 @@ pub use table::{ErrorText, HostInfo, Instance, Table};
 
 /// Major version of the line: another one never loads.
 pub const ABI_MAJOR: u16 = 1;
-/// Minor version of the line: the host loads every minor of its major whose `min_host_minor` it reaches.
-pub const ABI_MINOR: u16 = 0;
+/// Minor version of the line: the host loads every minor of its major whose `min_host_minor` it reaches. 1 brought
+/// segmenters.
+pub const ABI_MINOR: u16 = 1;
 
 /// What a function across the line returns.
 pub type Status = i32;

@@ -133,7 +133,7 @@ pub struct Hello {
     pub name: String,
     /// Its own version.
     pub version: String,
-    /// `matcher`, `detector` or `estimator`.
+    /// `matcher`, `detector`, `estimator` or `segmenter`.
     pub kind: String,
     /// One sentence.
     pub summary: String,

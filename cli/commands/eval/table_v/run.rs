@@ -3,10 +3,10 @@
 use super::experiment::Experiment;
 use super::output;
 use crate::args::{PluginSearch, TableV};
-use crate::commands::write_file;
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
+use crate::out_file::write_file;
 use crate::tools::{Choices, Tool, load, registry};
 use resurvey_core::version::PluginUse;
 use serde_json::Value;

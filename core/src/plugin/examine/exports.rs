@@ -14,8 +14,9 @@ const OF_THE_LINKER: [&str; 8] =
 /// Names that a message lists at most.
 const LISTED: usize = 5;
 
-/// Whether the declaration is the only symbol that `path` exports. Weak symbols (templates of C++) do not count: they
-/// cannot clash.
+/// Whether the declaration is the only symbol that `path` exports. Weak and unique symbols (templates of C++, such as those
+/// behind `std::make_shared`) do not count: whichever of several is taken is the same, and no flag of every compiler hides
+/// them.
 pub(super) fn only_the_declaration(path: &Path, bytes: &[u8]) -> Finding {
     match registry::read_declaration(path, bytes) {
         Err(fault) => return PluginError::from(registry::refusal(path, fault)).into(),
@@ -28,7 +29,7 @@ pub(super) fn only_the_declaration(path: &Path, bytes: &[u8]) -> Finding {
     };
     let mut others: Vec<String> = file
         .dynamic_symbols()
-        .filter(|symbol| symbol.is_definition() && symbol.is_global() && !symbol.is_weak())
+        .filter(|symbol| symbol.is_definition() && symbol.is_global() && !symbol.is_weak() && !is_unique(symbol))
         .filter_map(|symbol| {
             symbol.name().ok().map(|name| name.strip_prefix('_').filter(|_| is_mach_o(&file)).unwrap_or(name))
         })
@@ -48,8 +49,15 @@ pub(super) fn only_the_declaration(path: &Path, bytes: &[u8]) -> Finding {
     let more = if count > LISTED { ", …" } else { "" };
     Finding::failed(
         format!("expected one exported symbol, the declaration; found {count} more: {shown}{more}"),
-        "make functions static, or compile with -fvisibility=hidden; others of the same name would be called instead",
+        "make functions static, or compile with -fvisibility=hidden (in C++ also -fno-gnu-unique, and with libraries that are \
+         linked in -Wl,--exclude-libs,ALL); others of the same name would be called instead",
     )
+}
+
+/// Whether the linker makes one of all symbols of this name, in whatever library: GNU's extension of ELF for C++.
+fn is_unique(symbol: &object::Symbol<'_, '_>) -> bool {
+    const STB_GNU_UNIQUE: u8 = 10;
+    matches!(symbol.flags(), object::SymbolFlags::Elf { st_info, .. } if st_info >> 4 == STB_GNU_UNIQUE)
 }
 
 fn is_mach_o(file: &object::File<'_>) -> bool {

@@ -51,8 +51,24 @@ impl From<PluginError> for Finding {
             }
             PluginError::Cancelled { .. } => "return RSV_CANCELLED only after the host's cancelled() gave 1",
             PluginError::Settings { .. } => "make every default and every bound a value that the schema itself allows",
+            // Of an executable alone: a library runs in the process of the test itself.
+            PluginError::Crashed { .. } => "its last words say why; docs/plugin-wire.md says what a process has to do",
+            PluginError::Garbled { .. } => {
+                "put descriptor 2 in the place of 1 before anything prints: docs/plugin-wire.md says how, and what may be said"
+            }
+            PluginError::TimedOut { .. } => {
+                "end every loop, and answer each message: docs/plugin-wire.md says with what; --time-limit gives it longer"
+            }
             _ => "read the rules at the top of resurvey_plugin.h",
         };
-        Self::failed(error.to_string(), advice)
+        let problem = match &error {
+            // Without the way to this very test.
+            PluginError::Crashed { call, how, .. } => format!("crashed in {call}: {how}"),
+            PluginError::Garbled { call, expected, found, .. } => {
+                format!("broke the wire in {call}: expected {expected}, found {found}")
+            }
+            _ => error.to_string(),
+        };
+        Self::failed(problem, advice)
     }
 }

@@ -64,7 +64,7 @@ impl Bench<'_> {
         if declared.is_executable() {
             self.report.step("at its start");
             let place = (self.path, registry::fingerprint(self.path).map_err(refused)?);
-            return Ok(Plugin::apart(place, declared, sha256, Arc::clone(&self.isolation))?);
+            return Ok(Plugin::apart(place, declared, sha256, (Arc::clone(&self.isolation), None))?);
         }
         self.report.step("in the library's own start or in entry");
         let plugin = Plugin::open(self.path, declared, sha256).map_err(refused)?;
@@ -287,7 +287,8 @@ pub(super) fn repeats(bench: &Bench<'_>) -> Tried {
             if let Some(difference) = first.difference(&again) {
                 return Err(Finding::failed(
                     format!("{which} gave another answer to the same input: {difference}"),
-                    "use no clock, no random seed, no address and no order of threads; clear what a call leaves behind",
+                    "use no clock, no random seed, no address and no order of threads; clear what a call leaves behind, and copy \
+                     what you keep: an array that was lent has other values after the call",
                 ));
             }
         }

@@ -50,17 +50,19 @@ impl Apart {
 
     /// Ends the instance and says how that went.
     pub(in super::super) fn finish(&mut self) -> Result<(), PluginError> {
+        self.destroy(Turn::steady("destroy"))
+    }
+
+    fn destroy(&mut self, turn: Turn<'_>) -> Result<(), PluginError> {
         let Some(mut link) = self.link.take() else { return Ok(()) };
-        let turn = Turn::steady("destroy");
         let ended =
             link.send(&ToPlugin::Destroy {}, &turn).and_then(|()| link.conclude(turn, |_, _| Handled::OutOfTurn));
-        match self.judge(&link, ended) {
-            Ok(_) => {
-                self.program.put_back(link);
-                Ok(())
-            }
-            Err(error) => Err(error),
+        let ended = self.judge(&link, ended).map(|_| ());
+        if !link.is_dead() && matches!(ended, Ok(()) | Err(PluginError::Cancelled { .. })) {
+            link.lending.memory.set_cancelled(false);
+            self.program.put_back(link);
         }
+        ended
     }
 
     /// The process, with an instance made.
@@ -233,8 +235,8 @@ impl Apart {
 
 impl Drop for Apart {
     fn drop(&mut self) {
-        // Nobody can be told here; a crash is counted all the same. Who wants to know calls `finish`.
-        let _ = self.finish();
+        // Nobody can be told here, nor waits for long; a crash is counted all the same. Who wants to know calls `finish`.
+        let _ = self.destroy(Turn::new("destroy", &|| true));
     }
 }
 

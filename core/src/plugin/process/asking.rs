@@ -1,5 +1,6 @@
 //! The host's services in the process of a plugin: each is a request over the wire.
 
+use super::call_log::{LONGEST_LINE, cut};
 use super::memory::Plain;
 use super::talk::{Ends, Talk};
 use super::translate;
@@ -20,8 +21,6 @@ use resurvey_schema::{ChangeRegion, Class, ClassId, ClassTable, Descriptor, Grid
 const ASKED_COUNTS: usize = 32 << 20;
 /// Regions and proposals in one message: far from the longest line.
 const MESSAGE_RESULTS: usize = 500;
-/// Bytes of a line for the log.
-const LONGEST_LOG: usize = 16 << 10;
 
 /// The services during one call.
 pub(super) struct Asking<'a> {
@@ -375,8 +374,7 @@ impl Services for Asking<'_> {
             Level::Info => "info",
             Level::Debug => "debug",
         };
-        let end = (0..=LONGEST_LOG.min(text.len())).rev().find(|end| text.is_char_boundary(*end)).unwrap_or(0);
-        self.note(&ToHost::Log { level: level.to_owned(), text: text[..end].to_owned() });
+        self.note(&ToHost::Log { level: level.to_owned(), text: cut(text, LONGEST_LINE).to_owned() });
     }
 
     fn progress(&self, fraction: f64) {

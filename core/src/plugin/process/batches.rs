@@ -26,10 +26,11 @@ impl Apart {
         photo: &LabelImage,
         count: usize,
         view: &mut MakeView<'_>,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<f64>, PluginError> {
         let plugin = self.name();
         self.with_link(|link| {
-            let mut run = Run::new(link, &plugin, photo)?;
+            let mut run = Run::new(link, (&plugin, cancelled), photo)?;
             let outcome = run.all(count, view);
             if outcome.is_err() {
                 run.settle();
@@ -43,6 +44,7 @@ impl Apart {
 struct Run<'a> {
     link: &'a mut Link,
     plugin: &'a str,
+    cancelled: &'a dyn Fn() -> bool,
     size: (u32, u32),
     photo: Array,
     /// Where the batches begin in the memory.
@@ -64,13 +66,18 @@ struct Places {
 }
 
 impl<'a> Run<'a> {
-    fn new(link: &'a mut Link, plugin: &'a str, photo: &LabelImage) -> Result<Self, PluginError> {
+    fn new(
+        link: &'a mut Link,
+        (plugin, cancelled): (&'a str, &'a dyn Fn() -> bool),
+        photo: &LabelImage,
+    ) -> Result<Self, PluginError> {
         link.lending.start();
         let size = (photo.width(), photo.height());
         let photo = link.lending.raster(photo).map_err(|error| no_memory(plugin, &error))?;
         let mark = link.lending.mark();
         let (places, sent) = (None, [0; HALVES]);
-        Ok(Self { link, plugin, size, photo, mark, places, half: 0, filled: 0, sent, scores: Vec::new() })
+        let scores = Vec::new();
+        Ok(Self { link, plugin, cancelled, size, photo, mark, places, half: 0, filled: 0, sent, scores })
     }
 
     /// Takes one view; `left` are to come with it.
@@ -109,8 +116,9 @@ impl<'a> Run<'a> {
     /// Hears out what was sent before an error, so that the next call does not take it for its own.
     fn settle(&mut self) {
         for half in [self.half, (self.half + 1) % HALVES] {
-            if std::mem::take(&mut self.sent[half]) > 0 && !self.link.is_dead() {
-                let _ = self.link.conclude(Turn::steady("score"), |_, _| Handled::OutOfTurn);
+            let count = std::mem::take(&mut self.sent[half]);
+            if count > 0 && !self.link.is_dead() {
+                let _ = self.link.conclude(Turn::scoring(count, self.cancelled), |_, _| Handled::OutOfTurn);
             }
         }
     }
@@ -148,7 +156,7 @@ impl<'a> Run<'a> {
     fn collect(&mut self, half: usize) -> Result<(), PluginError> {
         let count = std::mem::take(&mut self.sent[half]);
         let Some(places) = self.places.as_ref().filter(|_| count > 0) else { return Ok(()) };
-        self.link.conclude(Turn::steady("score"), |_, _| Handled::OutOfTurn)?;
+        self.link.conclude(Turn::scoring(count, self.cancelled), |_, _| Handled::OutOfTurn)?;
         let mut scores = vec![f64::NAN; count];
         self.link.lending.memory.read_into(places.halves[half].1.offset, &mut scores);
         for score in &scores {

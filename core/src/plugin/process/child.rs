@@ -2,7 +2,7 @@
 
 use super::Isolation;
 use super::memory::SharedMemory;
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid};
 use std::ffi::OsStr;
 use std::io::{self, Read};
 use std::os::fd::OwnedFd;
@@ -57,13 +57,14 @@ impl Child {
             .stdin(Stdio::from(OwnedFd::from(memory.file()?)))
             .stdout(Stdio::from(OwnedFd::from(wire)))
             .stderr(Stdio::piped());
-        let mut process = spawn(command)?;
-        let words = Arc::new(Mutex::new(Words::default()));
-        if let Some(pipe) = process.stderr.take() {
-            let words = Arc::clone(&words);
+        let process = spawn(command)?;
+        // From here on an error ends the process, because it drops the child.
+        let mut child = Self { process, words: Arc::default(), is_ended: false };
+        if let Some(pipe) = child.process.stderr.take() {
+            let words = Arc::clone(&child.words);
             std::thread::Builder::new().name("plugin words".to_owned()).spawn(move || listen(pipe, &words))?;
         }
-        Ok(Self { process, words, is_ended: false })
+        Ok(child)
     }
 
     /// Waits for a process that has closed its wire, ends it, and says how it went.
@@ -111,9 +112,11 @@ impl Child {
             return None;
         }
         self.is_ended = true;
-        // The number is still that of the group: nobody has waited for the process yet.
+        // The number is still that of process and group: nobody has waited for the process yet, which may have gone to
+        // another group.
         if let Some(group) = self.group() {
             let _ = kill_process_group(group, Signal::KILL);
+            let _ = kill_process(group, Signal::KILL);
         }
         self.process.wait().ok()
     }
@@ -188,7 +191,7 @@ fn describe(status: ExitStatus) -> String {
 
 fn signal_name(signal: i32) -> &'static str {
     match Signal::from_named_raw(signal) {
-        Some(Signal::ABORT) => " (SIGABRT: it aborted)",
+        Some(Signal::ABORT) => " (SIGABRT: it aborted; where memory was short, --plugin-memory MIB gives it more)",
         Some(Signal::SEGV) => " (SIGSEGV: it used memory that is not its own)",
         Some(Signal::BUS) => " (SIGBUS)",
         Some(Signal::FPE) => " (SIGFPE)",

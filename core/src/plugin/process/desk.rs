@@ -1,5 +1,6 @@
 //! What the host does for a plugin in another process during a call: it takes results and answers requests.
 
+use super::call_log::CallLog;
 use super::lending::{Lending, first, view_bytes};
 use super::link::Handled;
 use super::memory::Plain;
@@ -7,7 +8,8 @@ use super::translate;
 use crate::plugin::check::{Rules, Violation, violation};
 use crate::plugin::results::{Collected, MOST_RESULTS};
 use crate::plugin::services::{
-    ServiceError, Services, class_slots, finite, finite_points, finite_poses, some_columns, some_stride,
+    SERVICE_PANICKED, ServiceError, Services, class_slots, finite, finite_points, finite_poses, some_columns,
+    some_stride,
 };
 use resurvey_schema::abi;
 use resurvey_schema::service::{ClassCounts, ClassSet, CompareRequest, Level, PanoramaRequest};
@@ -16,6 +18,7 @@ use resurvey_schema::wire::{
     ToHost, ToPlugin, WireProposal, WireRegion,
 };
 use resurvey_schema::{ChangeRegion, ClassId, GridPoint, PixelBox, Pose, Wgs84};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Bytes that one answer may hold.
 const MOST_ANSWERED: usize = 256 << 20;
@@ -37,6 +40,7 @@ pub(super) struct Desk<'a> {
     collected: Collected,
     /// Bytes of masks and texts in it.
     taken: usize,
+    log: CallLog,
 }
 
 type Answer = Result<Served, ServiceError>;
@@ -53,16 +57,26 @@ impl<'a> Desk<'a> {
     /// A desk for a call whose inputs are lent already.
     pub(super) fn new(services: &'a dyn Services, rules: Rules<'a>, lending: &Lending) -> Self {
         let size = (rules.width, rules.height);
-        Self { services, rules, size, mark: lending.mark(), collected: Collected::default(), taken: 0 }
+        let (mark, collected, log) = (lending.mark(), Collected::default(), CallLog::default());
+        Self { services, rules, size, mark, collected, taken: 0, log }
     }
 
     /// All results of the call.
     pub(super) fn finish(self) -> Collected {
+        self.log.finish(self.services);
         self.collected
     }
 
-    /// Does what one message asks for.
+    /// Does what one message asks for. A panic of a service is a bug of the host, and no reason to end the run.
     pub(super) fn handle(&mut self, lending: &mut Lending, message: &ToHost) -> Handled {
+        let handled = catch_unwind(AssertUnwindSafe(|| self.handle_one(lending, message)));
+        handled.unwrap_or_else(|_| match message {
+            ToHost::Log { .. } | ToHost::Progress(_) => Handled::Noted,
+            _ => Handled::Reply(Box::new(ToPlugin::Error { text: SERVICE_PANICKED.to_owned() })),
+        })
+    }
+
+    fn handle_one(&mut self, lending: &mut Lending, message: &ToHost) -> Handled {
         lending.back_to(self.mark);
         let answer = match message {
             ToHost::Heat { cells } => self.take(lending, |desk, lending| desk.heat(lending, cells)),
@@ -75,8 +89,8 @@ impl<'a> Desk<'a> {
                         _ => 0,
                     };
                     desk.has_room(index, "proposal", bytes)?;
-                    let proposal = translate::proposal(proposal.clone());
-                    desk.rules.proposal(index, &proposal)?;
+                    let mut proposal = translate::proposal(proposal.clone());
+                    desk.rules.proposal(index, &mut proposal)?;
                     desk.collected.proposals.push(proposal);
                     Ok(())
                 })
@@ -87,7 +101,7 @@ impl<'a> Desk<'a> {
                     "info" => Level::Info,
                     _ => Level::Debug,
                 };
-                self.services.log(level, text);
+                self.log.take(self.services, level, text);
                 return Handled::Noted;
             }
             ToHost::Progress(fraction) => {
@@ -254,12 +268,12 @@ impl<'a> Desk<'a> {
     }
 
     fn heat(&mut self, lending: &Lending, cells: &Array) -> Result<(), Violation> {
-        match lending.memory.array::<[f64; 3]>(cells) {
+        match lending.sent::<[f64; 3]>(cells) {
             Some(cells) if cells.len() <= MOST_RESULTS - self.collected.heat.len() => {
                 self.collected.heat.extend(cells);
                 Ok(())
             }
-            _ => violation("heat", &format_args!("{cells:?}"), format!("at most {MOST_RESULTS} cells in the memory")),
+            _ => violation("heat", &format_args!("{cells:?}"), format!("at most {MOST_RESULTS} cells in the scratch")),
         }
     }
 
@@ -267,9 +281,9 @@ impl<'a> Desk<'a> {
         for region in regions {
             let index = self.collected.regions.len();
             self.has_room(index, "region", Array::packed_bytes(Dtype::U8, &region.mask.shape).unwrap_or(usize::MAX))?;
-            let Some(mask) = lending.memory.array::<u8>(&region.mask) else {
+            let Some(mask) = lending.sent::<u8>(&region.mask) else {
                 let value = format!("{:?}", region.mask);
-                return violation(format!("region[{index}].mask"), &value, "packed bytes in the memory");
+                return violation(format!("region[{index}].mask"), &value, "packed bytes in the scratch");
             };
             let [left, top, right, bottom] = region.bounds;
             let region = ChangeRegion {
@@ -288,8 +302,9 @@ impl<'a> Desk<'a> {
 
 /// The rows of an array of a request.
 fn read<T: Plain>(lending: &Lending, array: &Array) -> Result<Vec<T>, ServiceError> {
-    let values = lending.memory.array(array);
-    values.ok_or_else(|| ServiceError(format!("expected packed rows of {:?} in the memory, found {array:?}", T::DTYPE)))
+    let values = lending.sent(array);
+    values
+        .ok_or_else(|| ServiceError(format!("expected packed rows of {:?} in the scratch, found {array:?}", T::DTYPE)))
 }
 
 fn points(lending: &Lending, array: &Array) -> Result<Vec<GridPoint>, ServiceError> {

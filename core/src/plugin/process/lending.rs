@@ -6,26 +6,45 @@ use crate::plugin::input::ViewImages;
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{Array, Dtype, MEMORY_HEADER, Scratch, WireViews};
 use std::io;
+use std::ops::Range;
 
 /// Least bytes that a plugin may write to in a call.
 const SCRATCH_BYTES: usize = 1 << 20;
+/// What stands where something was lent.
+const FORGOTTEN: u8 = 0xA5;
+/// Bytes that are lent one after the other before it is begun anew.
+const MOST_FORGOTTEN: usize = 64 << 20;
 
 /// The host's side of the memory.
 #[derive(Debug)]
 pub(super) struct Lending {
     pub(super) memory: SharedMemory,
+    /// The first byte that is lent in this call.
+    first: usize,
     /// The first byte that is not lent.
     next: usize,
+    /// The first byte that was not lent in this call.
+    end: usize,
+    /// Whether nothing of a call is there in the next.
+    forgets: bool,
+    /// What the plugin may write to in this call.
+    scratch: Range<usize>,
 }
 
 impl Lending {
-    pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { memory: SharedMemory::new()?, next: MEMORY_HEADER })
+    /// Nothing lent yet; with `forgets` a plugin that keeps what it was lent finds other things there.
+    pub(super) fn new(forgets: bool) -> io::Result<Self> {
+        let (memory, first) = (SharedMemory::new()?, MEMORY_HEADER);
+        Ok(Self { memory, first, next: first, end: first, forgets, scratch: 0..0 })
     }
 
     /// Takes everything back.
     pub(super) fn start(&mut self) {
-        self.next = MEMORY_HEADER;
+        if self.forgets {
+            self.memory.write(self.first, &vec![FORGOTTEN; self.end - self.first]);
+            self.first = if self.end < MOST_FORGOTTEN { aligned(self.end) } else { MEMORY_HEADER };
+        }
+        (self.next, self.end, self.scratch) = (self.first, self.first, 0..0);
         self.memory.set_cancelled(false);
     }
 
@@ -45,7 +64,7 @@ impl Lending {
         let end = Array::packed_bytes(dtype, shape).and_then(|bytes| offset.checked_add(bytes));
         let end = end.ok_or_else(|| io::Error::other("an array is larger than memory can be"))?;
         self.memory.grow(end)?;
-        self.next = end;
+        (self.next, self.end) = (end, self.end.max(end));
         Ok(Array::packed(dtype, shape, offset))
     }
 
@@ -65,7 +84,15 @@ impl Lending {
     pub(super) fn scratch(&mut self, pixels: usize) -> io::Result<Scratch> {
         let bytes = SCRATCH_BYTES.max(aligned(pixels));
         let array = self.reserve(Dtype::U8, &[bytes])?;
+        self.scratch = array.offset..array.offset + bytes;
         Ok(Scratch { offset: array.offset, bytes })
+    }
+
+    /// A copy of an array that the plugin has sent; `None` when it is none of these values, or lies outside the scratch.
+    pub(super) fn sent<T: Plain>(&self, array: &Array) -> Option<Vec<T>> {
+        let bytes = Array::packed_bytes(array.dtype, &array.shape)?;
+        let is_inside = array.offset >= self.scratch.start && array.offset.checked_add(bytes)? <= self.scratch.end;
+        if is_inside || bytes == 0 { self.memory.array(array) } else { None }
     }
 
     /// Places for `count` views of one size, with the table that their features index.
@@ -111,4 +138,38 @@ pub(super) fn view_bytes((width, height): (u32, u32)) -> usize {
     // Label, range, point and feature of a pixel.
     const PIXEL_BYTES: usize = 1 + 4 + 12 + 4;
     (width as usize * height as usize).saturating_mul(PIXEL_BYTES).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_to_be_forgotten_is_overwritten_and_lent_elsewhere() {
+        let mut lending = Lending::new(true).unwrap();
+        let first = lending.lend(&[4], &[7_u8; 4]).unwrap();
+        lending.start();
+        let second = lending.lend(&[4], &[8_u8; 4]).unwrap();
+        assert_ne!(first.offset, second.offset);
+        let at = |array: &Array| lending.memory.array::<u8>(array).unwrap();
+        assert_eq!((at(&first), at(&second)), (vec![FORGOTTEN; 4], vec![8; 4]));
+    }
+
+    #[test]
+    fn what_a_plugin_sends_lies_in_the_scratch_or_is_not_taken() {
+        let mut lending = Lending::new(false).unwrap();
+        let photo = lending.lend(&[8], &[7_u8; 8]).unwrap();
+        let scratch = lending.scratch(0).unwrap();
+        let array = |offset, length| Array::packed(Dtype::U8, &[length], offset);
+        assert_eq!(lending.sent::<u8>(&array(scratch.offset, 3)), Some(vec![0; 3]));
+        let end = scratch.offset + scratch.bytes;
+        assert_eq!(lending.sent::<u8>(&array(end - 2, 2)), Some(vec![0; 2]));
+        for wrong in [photo, array(end - 2, 3), array(end, usize::MAX), array(scratch.offset - 64, 65)] {
+            assert_eq!(lending.sent::<u8>(&wrong), None, "{wrong:?}");
+        }
+        // Nothing lies nowhere.
+        assert_eq!(lending.sent::<u8>(&array(0, 0)), Some(Vec::new()));
+        lending.start();
+        assert_eq!(lending.sent::<u8>(&array(scratch.offset, 3)), None);
+    }
 }

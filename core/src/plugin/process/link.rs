@@ -35,15 +35,23 @@ pub(super) struct Turn<'a> {
     started: Instant,
     /// What the plugin took of it.
     own: Duration,
-    /// `scored` of the memory when `own` was last set back.
+    /// `scored` of the memory when the clock was last set back.
     scored: u32,
+    /// How often the plugin may yet set it back.
+    set_backs: usize,
     cancelled: &'a dyn Fn() -> bool,
     cancelled_at: Option<Instant>,
 }
 
 impl<'a> Turn<'a> {
     pub(super) fn new(call: &'static str, cancelled: &'a dyn Fn() -> bool) -> Self {
-        Self { call, started: Instant::now(), own: Duration::ZERO, scored: 0, cancelled, cancelled_at: None }
+        let (started, own) = (Instant::now(), Duration::ZERO);
+        Self { call, started, own, scored: 0, set_backs: 0, cancelled, cancelled_at: None }
+    }
+
+    /// Scoring so many views: the limits are those of one.
+    pub(super) fn scoring(views: usize, cancelled: &'a dyn Fn() -> bool) -> Self {
+        Self { set_backs: views, ..Self::new("score", cancelled) }
     }
 
     /// A call that nobody cancels.
@@ -84,14 +92,15 @@ impl Link {
 
     /// The next message.
     pub(super) fn next(&mut self, turn: &mut Turn<'_>) -> Result<ToHost, PluginError> {
-        let mut seen = Instant::now();
+        let (mut seen, mut has_left) = (Instant::now(), false);
         loop {
             let heard = self.wire.receive();
             turn.own += seen.elapsed();
             seen = Instant::now();
             match heard {
-                // Who has the wire from the process, such as one that it has started, keeps it open after its end.
-                Err(Silence::Waiting) if self.child.has_left() => return Err(self.crashed(turn.call)),
+                // Who has the wire from the process, such as one that it has started, keeps it open after its end; what
+                // the process itself said before is heard by now.
+                Err(Silence::Waiting) if has_left => return Err(self.crashed(turn.call)),
                 Ok(_) | Err(Silence::Waiting) => self.check_limits(turn)?,
                 Err(Silence::Ended) => return Err(self.crashed(turn.call)),
                 Err(Silence::Garbage { found, reason }) => {
@@ -101,6 +110,7 @@ impl Link {
             if let Ok(message) = heard {
                 return Ok(message);
             }
+            has_left = self.child.has_left();
         }
     }
 
@@ -114,10 +124,11 @@ impl Link {
         loop {
             let message = self.next(&mut turn)?;
             match message {
-                ToHost::Done { localization } => return Ok(localization),
-                ToHost::Failed { .. } | ToHost::Cancelled {} if (turn.cancelled)() => {
+                // What is done after a cancel may be done by half.
+                ToHost::Done { .. } | ToHost::Failed { .. } if (turn.cancelled)() => {
                     return Err(PluginError::Cancelled { plugin, call });
                 }
+                ToHost::Done { localization } => return Ok(localization),
                 ToHost::Cancelled {} => return Err(PluginError::Cancelled { plugin, call }),
                 ToHost::Failed { text } => return Err(PluginError::Failed { plugin, call, text }),
                 ToHost::Panicked { text } => {
@@ -140,7 +151,8 @@ impl Link {
     /// Ends the process of a plugin that takes too long, or does not hear that it is to end.
     fn check_limits(&mut self, turn: &mut Turn<'_>) -> Result<(), PluginError> {
         let scored = self.lending.memory.scored();
-        if scored != turn.scored {
+        if scored != turn.scored && turn.set_backs > 0 {
+            turn.set_backs -= 1;
             turn.scored = scored;
             turn.own = Duration::ZERO;
             turn.started = Instant::now();

@@ -78,14 +78,15 @@ impl SharedMemory {
         fcntl_add_seals(&file, SealFlags::SHRINK)?;
         let file = File::from(file);
         allocate(&file, FIRST_BYTES)?;
-        let memory = Self { map: map(&file)?, file, older: Vec::new() };
+        let memory = Self { map: map(&file, FIRST_BYTES)?, file, older: Vec::new() };
         memory.write(0, &MEMORY_MAGIC);
         Ok(memory)
     }
 
     /// The memory that the host made.
     pub(in super::super) fn open(file: File) -> io::Result<Self> {
-        let memory = Self { map: map(&file)?, file, older: Vec::new() };
+        let bytes = usize::try_from(file.metadata()?.len()).map_err(io::Error::other)?;
+        let memory = Self { map: map(&file, bytes)?, file, older: Vec::new() };
         let mut magic = [0; MEMORY_MAGIC.len()];
         if memory.bytes() < MEMORY_HEADER || !memory.read_into(0, &mut magic) || magic != MEMORY_MAGIC {
             return Err(io::Error::other("descriptor 0 is not the memory of a plugin wire"));
@@ -108,7 +109,7 @@ impl SharedMemory {
         if bytes > self.bytes() {
             let doubled = bytes.checked_next_power_of_two().unwrap_or(bytes);
             allocate(&self.file, doubled)?;
-            self.map = map(&self.file)?;
+            self.map = map(&self.file, doubled)?;
         }
         Ok(())
     }
@@ -116,7 +117,7 @@ impl SharedMemory {
     /// Maps what the host has added; what was lent before stays where it is until [`forget_older`](Self::forget_older).
     pub(in super::super) fn follow(&mut self, bytes: usize) -> io::Result<()> {
         if bytes > self.bytes() {
-            self.older.push(std::mem::replace(&mut self.map, map(&self.file)?));
+            self.older.push(std::mem::replace(&mut self.map, map(&self.file, bytes)?));
         }
         Ok(())
     }
@@ -209,8 +210,9 @@ fn allocate(file: &File, bytes: usize) -> io::Result<()> {
     Ok(rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, bytes as u64)?)
 }
 
-fn map(file: &File) -> io::Result<MmapRaw> {
-    MmapOptions::new().map_raw(file)
+/// The first `bytes` of the file, however long the other side has made it.
+fn map(file: &File, bytes: usize) -> io::Result<MmapRaw> {
+    MmapOptions::new().len(bytes).map_raw(file)
 }
 
 #[cfg(test)]
@@ -240,6 +242,16 @@ mod tests {
         let memory = SharedMemory::new().unwrap();
         let error = memory.file().unwrap().set_len(0).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::PermissionDenied);
+    }
+
+    #[test]
+    fn the_host_maps_what_it_has_made_and_not_what_a_plugin_makes_of_it() {
+        let mut memory = SharedMemory::new().unwrap();
+        memory.file().unwrap().set_len(1 << 40).unwrap();
+        assert_eq!(memory.bytes(), FIRST_BYTES);
+        memory.grow(FIRST_BYTES + 1).unwrap();
+        assert_eq!(memory.bytes(), 2 * FIRST_BYTES);
+        assert_eq!(memory.array::<u8>(&Array::packed(Dtype::U8, &[1 << 20], 0)), None);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 mod apart;
 mod asking;
 mod batches;
+mod call_log;
 mod child;
 mod desk;
 mod fingerprint;

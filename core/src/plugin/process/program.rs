@@ -5,6 +5,7 @@ use super::fingerprint::Fingerprint;
 use super::lending::Lending;
 use super::link::{About, Link, Turn};
 use super::wire::Wire;
+use crate::plugin::crashes::CrashLog;
 use crate::plugin::declaration::{Declared, Fault};
 use crate::plugin::error::{PluginError, Refusal, Stage};
 use crate::plugin::info::Digest;
@@ -12,6 +13,7 @@ use crate::plugin::isolation::Isolation;
 use crate::plugin::kinds::MatcherForm;
 use crate::plugin::settings::SettingsSchema;
 use resurvey_schema::wire::{Hello, ToHost, WIRE_VERSION};
+use rustix::process::{Resource, getrlimit};
 use std::ffi::{OsStr, OsString};
 use std::io;
 use std::os::unix::net::UnixStream;
@@ -25,6 +27,7 @@ const MOST_IDLE: usize = 4;
 #[derive(Debug)]
 pub(in super::super) struct Program {
     isolation: Arc<Isolation>,
+    crashes: Option<CrashLog>,
     path: PathBuf,
     /// Of the file when it was hashed.
     fingerprint: Fingerprint,
@@ -40,7 +43,7 @@ impl Program {
         (path, fingerprint): (&Path, Fingerprint),
         declared: Declared,
         sha256: Digest,
-        isolation: Arc<Isolation>,
+        (isolation, crashes): (Arc<Isolation>, Option<CrashLog>),
     ) -> Result<(Self, SettingsSchema), PluginError> {
         let hello = Hello {
             wire: WIRE_VERSION,
@@ -53,7 +56,7 @@ impl Program {
         };
         let idle = Mutex::default();
         let path = path.to_owned();
-        let mut program = Self { isolation, path, fingerprint, sha256, declared, hello, idle };
+        let mut program = Self { isolation, crashes, path, fingerprint, sha256, declared, hello, idle };
         let (link, hello) = program.start()?;
         program.check_hello(&hello).map_err(|fault| program.refused(fault))?;
         let schema = SettingsSchema::parse(&hello.settings_schema)
@@ -95,10 +98,10 @@ impl Program {
         }
     }
 
-    /// Counts a crash; other errors are not counted.
+    /// Counts a crash in a call; other errors are not counted, nor those that too little memory may have made.
     pub(super) fn count(&self, error: &PluginError) {
         let (PluginError::Crashed { call, .. } | PluginError::Garbled { call, .. }) = error else { return };
-        if let Some(log) = &self.isolation.crashes {
+        if let Some(log) = self.crashes.as_ref().filter(|_| has_room(&self.isolation)) {
             // Without the file the plugin is only trusted for longer; the crash itself is told.
             let _ = log.record(self.sha256, &self.declared.name, call);
         }
@@ -107,7 +110,8 @@ impl Program {
     fn start(&self) -> Result<(Link, Hello), PluginError> {
         self.refuse_quarantined()?;
         let mut link = self.open().map_err(|error| {
-            let text = format!("its process could not be started: {error}");
+            let next = "free memory and processes, or raise their limits";
+            let text = format!("its process could not be started: {error}; {next}");
             PluginError::InvalidInput { plugin: self.declared.name.clone(), text }
         })?;
         let mut turn = Turn::steady("load");
@@ -119,18 +123,13 @@ impl Program {
             }
             other => Err(link.out_of_turn("load", &other)),
         });
-        match heard {
-            Ok(hello) => Ok((link, hello)),
-            Err(error) => {
-                self.count(&error);
-                Err(error)
-            }
-        }
+        // An end before the first word is not counted: the reason may be an interpreter or a library that is missing.
+        heard.map(|hello| (link, hello))
     }
 
     fn open(&self) -> io::Result<Link> {
         let (ours, theirs) = UnixStream::pair()?;
-        let lending = Lending::new()?;
+        let lending = Lending::new(self.isolation.forgets)?;
         let mode = if self.declared.is_executable() { "executable" } else { "library" };
         let (memory, parent) = (self.isolation.memory_mib.to_string(), std::process::id().to_string());
         let words = [mode, &memory, &parent, self.fingerprint.as_str()].map(OsString::from);
@@ -142,7 +141,7 @@ impl Program {
     }
 
     fn refuse_quarantined(&self) -> Result<(), PluginError> {
-        let Some(log) = &self.isolation.crashes else { return Ok(()) };
+        let Some(log) = &self.crashes else { return Ok(()) };
         log.check(self.sha256).map_err(|fault| self.refused(fault))
     }
 
@@ -170,6 +169,14 @@ impl Program {
         let name = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
         Refusal { name, path: Some(self.path.clone()), stage, reason, advice }.into()
     }
+}
+
+/// Whether plugins have at least the memory that they have unless somebody says otherwise.
+fn has_room(isolation: &Isolation) -> bool {
+    let mib = |bytes: u64| bytes >> 20;
+    let least = Isolation::DEFAULT_MEMORY_MIB;
+    let of_system = getrlimit(Resource::As).maximum.map_or(u64::MAX, mib);
+    of_system >= least && (isolation.memory_mib == 0 || isolation.memory_mib >= least)
 }
 
 fn corrected() -> String {

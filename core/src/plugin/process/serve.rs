@@ -12,7 +12,7 @@ use crate::plugin::open::{Code, Plugin};
 use crate::plugin::settings::Settings;
 use crate::plugin::{Kind, MatcherForm, PluginError};
 use resurvey_schema::wire::{Hello, Invalid, Refused, ToHost, ToPlugin, WIRE_VERSION};
-use rustix::process::{Resource, Rlimit, Signal, getppid, set_parent_process_death_signal, setrlimit};
+use rustix::process::{Resource, Rlimit, Signal, getppid, getrlimit, set_parent_process_death_signal, setrlimit};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
@@ -66,9 +66,10 @@ impl Task {
 fn run(task: &Task) -> io::Result<()> {
     limit(task)?;
     if !task.is_library {
-        check_unchanged(task).map_err(|(_, reason, _)| io::Error::other(reason))?;
-        // Returns only when the file cannot be started.
-        return Err(Command::new(&task.path).exec());
+        // Becomes the plugin, or says why it cannot.
+        let fault = check_unchanged(task).err().unwrap_or_else(|| not_started(&Command::new(&task.path).exec()));
+        take_descriptors()?.refuse(fault);
+        return Ok(());
     }
     let mut ends = take_descriptors()?;
     match open(task) {
@@ -76,12 +77,23 @@ fn run(task: &Task) -> io::Result<()> {
             let hello = hello(&plugin);
             converse(&plugin, ends, &hello);
         }
-        Err((stage, reason, advice)) => {
-            let refused = Refused { stage: stage.to_string(), reason, advice };
-            let _ = ends.wire.send(&ToHost::Refused(refused), || true);
-        }
+        Err(fault) => ends.refuse(fault),
     }
     Ok(())
+}
+
+fn not_started(error: &io::Error) -> Fault {
+    let advice = "is the interpreter that its first line names there, and does the file run by itself?".to_owned();
+    (Stage::File, format!("it cannot be started: {error}"), advice)
+}
+
+impl Ends {
+    /// Says why there is no plugin, in place of its first words.
+    fn refuse(&mut self, (stage, reason, advice): Fault) {
+        let refused = Refused { stage: stage.to_string(), reason, advice };
+        // Without a host nobody is to be told.
+        let _ = self.wire.send(&ToHost::Refused(refused), || true);
+    }
 }
 
 /// Ends with the host, leaves no dump of its memory, and takes no more than it may.
@@ -90,12 +102,20 @@ fn limit(task: &Task) -> io::Result<()> {
     if getppid().is_none_or(|parent| parent.as_raw_nonzero().get().unsigned_abs() != task.host) {
         return Err(io::Error::other("the host has gone"));
     }
-    let at_most = |bytes| Rlimit { current: Some(bytes), maximum: Some(bytes) };
-    setrlimit(Resource::Core, at_most(0))?;
+    at_most(Resource::Core, 0)?;
     if task.memory_mib > 0 {
-        setrlimit(Resource::As, at_most(task.memory_mib.saturating_mul(1 << 20)))?;
+        let bytes = task.memory_mib.saturating_mul(1 << 20);
+        at_most(Resource::As, bytes)?;
+        // A file in memory, such as the one that it shares with the host, is no address space until it is mapped.
+        at_most(Resource::Fsize, bytes)?;
     }
     Ok(())
+}
+
+/// Limits a resource, which the system may have limited further: nobody may raise that.
+fn at_most(resource: Resource, wanted: u64) -> io::Result<()> {
+    let most = getrlimit(resource).maximum.map_or(wanted, |hard| hard.min(wanted));
+    Ok(setrlimit(resource, Rlimit { current: Some(most), maximum: Some(most) })?)
 }
 
 /// Moves wire and memory out of the reach of a plugin that prints or reads.

@@ -7,7 +7,8 @@ use super::translate;
 use super::wire::{Silence, Wire};
 use crate::plugin::error::PluginError;
 use crate::plugin::instance::Instance;
-use crate::plugin::{lend, line};
+use crate::plugin::lend::{self, LentComparison};
+use crate::plugin::line;
 use resurvey_schema::abi::{self, Growing};
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{
@@ -82,6 +83,9 @@ impl Talk {
         self.follow(call.memory)?;
         let count = *call.scores.shape.first().unwrap_or(&0);
         for index in 0..count {
+            if self.cancelled() {
+                return Ok(ToHost::Cancelled {});
+            }
             let (photo, view) = {
                 let memory = &self.lock().memory;
                 (image(memory, &call.photo, None)?, view(memory, &call.views, index)?)
@@ -111,23 +115,23 @@ impl Talk {
     }
 
     fn detect(&self, instance: &mut Instance, call: &DetectCall) -> Result<ToHost, PluginError> {
-        let lent = Lent::new(self, call)?;
+        let lent = comparison(self, call)?;
         let asking = Asking::new(self, call.scratch, &call.classes)?;
         // SAFETY: as in `search`; `lent` lives in this function.
-        let regions = unsafe { line::detect(instance, &asking, &lent.comparison()) }?;
+        let regions = unsafe { line::detect(instance, &asking, &lent.record()) }?;
         asking.deliver_regions(&regions)?;
         Ok(ToHost::Done { localization: None })
     }
 
     fn estimate(&self, instance: &mut Instance, call: &EstimateCall) -> Result<ToHost, PluginError> {
-        let lent = Lent::new(self, &call.comparison)?;
+        let lent = comparison(self, &call.comparison)?;
         let records = {
             let memory = &self.lock().memory;
             call.regions.iter().map(|one| region(memory, one)).collect::<Result<Vec<_>, _>>()?
         };
         let asking = Asking::new(self, call.comparison.scratch, &call.comparison.classes)?;
         // SAFETY: as in `detect`.
-        let proposals = unsafe { line::estimate(instance, &asking, &lent.comparison(), &records) }?;
+        let proposals = unsafe { line::estimate(instance, &asking, &lent.record(), &records) }?;
         asking.deliver_proposals(&proposals)?;
         Ok(ToHost::Done { localization: None })
     }
@@ -146,35 +150,16 @@ impl Talk {
     }
 }
 
-/// What a comparison points to.
-struct Lent {
-    photo: abi::Image,
-    view: abi::View,
-    camera: abi::Camera,
-    estimate: abi::PoseEstimate,
-}
-
-impl Lent {
-    fn new(talk: &Talk, call: &DetectCall) -> Result<Self, PluginError> {
-        talk.follow(call.memory)?;
-        let memory = &talk.lock().memory;
-        Ok(Self {
-            photo: image(memory, &call.photo, None)?,
-            view: view(memory, &call.views, 0)?,
-            camera: lend::camera(&translate::intrinsics(&call.camera)),
-            estimate: lend::estimate(&translate::estimate(&call.estimate)),
-        })
-    }
-
-    fn comparison(&self) -> abi::Comparison {
-        abi::Comparison {
-            photo: self.photo,
-            view: &raw const self.view,
-            camera: &raw const self.camera,
-            estimate: &raw const self.estimate,
-            ..abi::Comparison::new()
-        }
-    }
+/// What a comparison points to, in the memory.
+fn comparison(talk: &Talk, call: &DetectCall) -> Result<LentComparison, PluginError> {
+    talk.follow(call.memory)?;
+    let memory = &talk.lock().memory;
+    Ok(LentComparison {
+        photo: image(memory, &call.photo, None)?,
+        view: view(memory, &call.views, 0)?,
+        camera: lend::camera(&translate::intrinsics(&call.camera)),
+        estimate: lend::estimate(&translate::estimate(&call.estimate)),
+    })
 }
 
 /// An image of the memory: the whole array, or number `index` of a stack.

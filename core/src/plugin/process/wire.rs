@@ -23,6 +23,8 @@ pub(super) struct Wire {
     /// Bytes after `start` that have no line end.
     searched: usize,
     out: Vec<u8>,
+    /// Bytes of the longest line that is read.
+    longest: usize,
 }
 
 /// Why no message came.
@@ -37,16 +39,16 @@ pub(super) enum Silence {
 }
 
 impl Wire {
-    /// An end whose reads and writes never block for long.
+    /// The host's end: reads and writes never block for long, and lines are no longer than a plugin's may be.
     pub(super) fn impatient(stream: UnixStream) -> io::Result<Self> {
         stream.set_read_timeout(Some(SLICE))?;
         stream.set_write_timeout(Some(SLICE))?;
-        Ok(Self::patient(stream))
+        Ok(Self { longest: LONGEST_LINE, ..Self::patient(stream) })
     }
 
-    /// An end that waits.
+    /// A plugin's end: it waits, and takes whatever the host has to say.
     pub(super) fn patient(stream: UnixStream) -> Self {
-        Self { stream, buffer: Vec::new(), start: 0, end: 0, searched: 0, out: Vec::new() }
+        Self { stream, buffer: Vec::new(), start: 0, end: 0, searched: 0, out: Vec::new(), longest: usize::MAX }
     }
 
     /// Sends one message; `wait` says whether to go on when the other side does not read.
@@ -79,8 +81,8 @@ impl Wire {
                 return message;
             }
             self.searched = fresh.len();
-            if fresh.len() >= LONGEST_LINE {
-                return Err(garbage(fresh, &format_args!("no line end in {LONGEST_LINE} bytes")));
+            if fresh.len() >= self.longest {
+                return Err(garbage(fresh, &format_args!("no line end in {} bytes", self.longest)));
             }
             self.fill()?;
         }
@@ -154,6 +156,16 @@ mod tests {
         drop(other);
         let Err(Silence::Garbage { found, reason }) = wire.receive::<Value>() else { panic!("expected garbage") };
         assert_eq!((found.len(), reason.as_str()), (80 + 2 + "…".len(), "the wire ended in the middle of a line"));
+    }
+
+    #[test]
+    fn a_plugin_takes_a_line_of_the_host_however_long() {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let long = "x".repeat(3 * LONGEST_LINE);
+        let sent = long.clone();
+        let host = std::thread::spawn(move || Wire::impatient(ours).unwrap().send(&sent, || true).unwrap());
+        assert_eq!(Wire::patient(theirs).receive::<String>().unwrap(), long);
+        host.join().unwrap();
     }
 
     #[test]

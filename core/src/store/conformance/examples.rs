@@ -97,7 +97,7 @@ pub fn a_key_goes_with_one_request(make: Make<'_>) {
         Err(CommitError::OtherRequest { key: "photo 12".to_owned(), version, made, asked })
     };
     assert_eq!(history.commit_once(&asking(4.0, Some(other)), at(3)), refused(VersionKind::Update, Some(other)));
-    let undo = Revert { idempotency_key: Some("photo 12".to_owned()), ..wish(1) };
+    let undo = Revert { idempotency_key: Some("photo 12".to_owned()), ..wish(1, None) };
     assert_eq!(history.revert_once(&undo, at(3)), refused(VersionKind::Revert, None));
     assert_eq!((history.head(), history.request_of(version)), (Ok(version), Ok(Some(first))));
     sound(subject.as_ref());
@@ -140,6 +140,29 @@ pub fn a_number_is_never_given_twice(make: Make<'_>) {
     update.deltas = vec![removal.undone()];
     assert_eq!(history.commit(&update, at(4)), Ok(VersionId(4)));
     assert_eq!(state(history, 2), chair(100.0));
+    sound(subject.as_ref());
+}
+
+/// A change set brings numbers of its own: none that was another thing's, and none that would use up all numbers.
+pub fn a_number_stays_with_its_thing_and_near_the_others(make: Make<'_>) {
+    let subject = with_two_features(make);
+    let history = subject.history();
+    let mut update = transaction(1);
+    update.deltas = vec![Delta::remove(Fid(2), chair(100.0))];
+    assert_eq!(history.commit(&update, at(2)), Ok(VersionId(2)));
+    let under = |base, fid, state: FeatureState| UpdateTransaction {
+        deltas: vec![Delta::add(Fid(fid), state)],
+        ..transaction(base)
+    };
+    let (was, found) = ("a dynamic descriptor of class 5".to_owned(), "a material descriptor of class 3".to_owned());
+    let refused = CommitError::FidOfAnother { fid: Fid(2), was, found };
+    assert_eq!(history.commit(&under(2, 2, banner(50.0)), at(3)), Err(refused));
+    assert_eq!(history.commit(&under(2, 2, chair(70.0)), at(3)), Ok(VersionId(3)));
+    let ahead = CommitError::FidAhead { fid: Fid::MAX, last: Fid(2) };
+    assert_eq!(history.commit(&under(3, Fid::MAX.0, chair(0.0)), at(4)), Err(ahead));
+    assert_eq!(history.commit(&under(3, 1_000_000, chair(0.0)), at(4)), Ok(VersionId(4)));
+    assert_eq!(add(history, &[chair(5.0)]), Ok(VersionId(5)));
+    assert_eq!(state(history, 1_000_001), chair(5.0));
     sound(subject.as_ref());
 }
 

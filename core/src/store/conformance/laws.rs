@@ -1,11 +1,12 @@
 //! Laws of random histories.
 
-use super::play::{apply, update};
+use super::play::{apply, part, update};
 use super::{Content, Make, Moves, Subject, at, content, moves, new_map, play, sound, transaction};
 use crate::store::{CommitError, ConflictingChange, History, MemoryMap, Revert, StoreError};
 use crate::version::{
     BoxMm, Counts, Delta, FeatureState, Operations, UpdateTransaction, VersionId, VersionRecord, version_hash,
 };
+use jiff::SignedDuration;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
@@ -29,10 +30,10 @@ fn for_all<S: Strategy>(
     }
 }
 
-pub(super) fn wish(version: u64) -> Revert {
+pub(super) fn wish(version: u64, region: Option<BoxMm>) -> Revert {
     Revert {
         version: VersionId(version),
-        region: None,
+        region,
         author: "ada".to_owned(),
         message: None,
         idempotency_key: None,
@@ -41,13 +42,7 @@ pub(super) fn wish(version: u64) -> Revert {
 }
 
 fn undo(history: &dyn History, version: usize) -> Result<VersionId, CommitError> {
-    history.revert(&wish(version as u64), at(100))
-}
-
-/// A strip of the plan, `length` m from `low` m north of the place of the test's features.
-fn strip(low: f64, length: f64) -> BoxMm {
-    let n0 = 817_816.210_8 + low;
-    BoxMm::of_plan(835_500.0, n0, 835_600.0, n0 + length).expect("ends in order")
+    history.revert(&wish(version as u64, None), at(100))
 }
 
 fn is_in(state: &FeatureState, region: &BoxMm) -> bool {
@@ -100,10 +95,10 @@ pub fn a_difference_leads_from_one_version_to_the_other_and_back(make: Make<'_>)
 
 /// Features, changes, the log and the second time axis of a region are those of the whole map that lie there.
 pub fn a_question_about_a_region_is_the_whole_answer_filtered(make: Make<'_>) {
-    for_all(make, (-55.0..50.0_f64, 0.0..40.0_f64, 0_i64..9), |subject, transactions, (low, length, minute)| {
+    for_all(make, (part(), any::<usize>(), 0_i64..9), |subject, transactions, (region, other, minute)| {
         let history = subject.history();
         let contents = play(history, transactions);
-        let region = strip(low, length);
+        let other = VersionId((other % contents.len()) as u64);
         for version in (0..contents.len() as u64).map(VersionId) {
             let mut features = history.features(version, None).expect("features");
             features.retain(|feature| is_in(&feature.state, &region));
@@ -111,9 +106,9 @@ pub fn a_question_about_a_region_is_the_whole_answer_filtered(make: Make<'_>) {
             let mut observed = history.features_observed(version, at(minute), None).expect("features");
             observed.retain(|feature| is_in(&feature.state, &region));
             prop_assert_eq!(history.features_observed(version, at(minute), Some(&region)), Ok(observed));
-            let mut changes = history.changes(VersionId(0), version, None).expect("changes");
+            let mut changes = history.changes(other, version, None).expect("changes");
             changes.retain(|delta| touches(delta, &region));
-            prop_assert_eq!(history.changes(VersionId(0), version, Some(&region)), Ok(changes));
+            prop_assert_eq!(history.changes(other, version, Some(&region)), Ok(changes));
         }
         let mut log = Vec::new();
         for record in history.log(None).expect("a log") {
@@ -253,14 +248,14 @@ pub fn lives_have_no_gaps_but_where_a_feature_was_gone(make: Make<'_>) {
 #[derive(Clone, Debug)]
 struct Writer {
     behind: u64,
-    looked: Option<(f64, f64)>,
+    looked: Option<BoxMm>,
     seen: Option<i64>,
-    undoes: Option<usize>,
+    undoes: Option<(usize, Option<BoxMm>)>,
 }
 
 fn writers() -> impl Strategy<Value = Vec<Writer>> {
-    let looked = proptest::option::of((-50.0..50.0_f64, 0.0..20.0_f64));
-    let one = (0_u64..3, looked, proptest::option::of(0_i64..50), proptest::option::weighted(0.2, any::<usize>()));
+    let undoes = proptest::option::weighted(0.3, (any::<usize>(), proptest::option::of(part())));
+    let one = (0_u64..3, proptest::option::of(part()), proptest::option::of(0_i64..50), undoes);
     let one = one.prop_map(|(behind, looked, seen, undoes)| Writer { behind, looked, seen, undoes });
     proptest::collection::vec(one, 8)
 }
@@ -271,17 +266,18 @@ pub fn answers_and_refusals_are_those_of_the_plain_map(make: Make<'_>) {
         let history = subject.history();
         let plain = MemoryMap::new(&new_map(), at(0)).expect("a map");
         for (step, (moves, writer)) in transactions.iter().zip(&writers).enumerate() {
-            let now = at(10 * step as i64);
+            // Between two microseconds, which is what a map keeps.
+            let now = at(10 * step as i64) + SignedDuration::from_nanos(1_234_567);
             let head = plain.head().expect("a head").0;
-            if let Some(undone) = writer.undoes {
-                let wish = wish(undone as u64 % (head + 2));
+            if let Some((undone, region)) = writer.undoes {
+                let wish = wish(undone as u64 % (head + 2), region);
                 prop_assert_eq!(history.revert(&wish, now), plain.revert(&wish, now));
                 continue;
             }
             let base = head.saturating_sub(writer.behind);
             let mut update: UpdateTransaction = update(base, &content(&plain, base as usize), moves);
-            update.viewed_region = writer.looked.map(|(low, length)| strip(low, length));
-            update.observed_at = writer.seen.map(at);
+            update.viewed_region = writer.looked;
+            update.observed_at = writer.seen.map(|minute| at(minute) + SignedDuration::from_nanos(1_500));
             prop_assert_eq!(history.commit(&update, now), plain.commit(&update, now));
         }
         same_answers(history, &plain)

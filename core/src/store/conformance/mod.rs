@@ -64,6 +64,7 @@ macro_rules! conformance_tests {
             a_key_goes_with_one_request,
             a_late_photo_speaks_of_its_own_time,
             a_number_is_never_given_twice,
+            a_number_stays_with_its_thing_and_near_the_others,
             geometry_is_kept_once_under_its_digest,
             a_version_has_names,
             what_is_not_there_is_refused_by_name,

@@ -2,16 +2,25 @@
 
 use super::{at, banner, chair, transaction};
 use crate::store::History;
-use crate::version::{Delta, FeatureState, Fid, UpdateTransaction, VersionId};
+use crate::version::{BoxMm, Delta, Digest, FeatureState, Fid, UpdateTransaction, VersionId};
 use proptest::prelude::*;
+use resurvey_schema::{Descriptor, GridPoint};
 use std::collections::BTreeMap;
 
-/// What a random transaction does next.
+/// What a random transaction does next; places are metres east, north and above that of the test's features.
 #[derive(Clone, Debug)]
 pub(crate) enum Move {
-    Add(bool, f64),
-    Change(usize, f64),
+    Add(Thing, [f64; 3]),
+    Change(usize, [f64; 3]),
     Remove(usize),
+}
+
+/// A kind of feature.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Thing {
+    Banner,
+    Chair,
+    Tower,
 }
 
 /// The moves of one transaction.
@@ -22,16 +31,63 @@ pub(crate) type Content = BTreeMap<Fid, FeatureState>;
 
 /// Histories of one to seven transactions, with one to four moves each.
 pub(crate) fn moves() -> impl Strategy<Value = Vec<Moves>> {
+    let thing = prop_oneof![Just(Thing::Banner), Just(Thing::Chair), Just(Thing::Tower)];
     let one = prop_oneof![
-        (any::<bool>(), -50.0..50.0_f64).prop_map(|(is_banner, offset)| Move::Add(is_banner, offset)),
-        (any::<usize>(), -50.0..50.0_f64).prop_map(|(which, offset)| Move::Change(which, offset)),
+        (thing, place()).prop_map(|(thing, place)| Move::Add(thing, place)),
+        (any::<usize>(), place()).prop_map(|(which, place)| Move::Change(which, place)),
         any::<usize>().prop_map(Move::Remove),
     ];
     proptest::collection::vec(proptest::collection::vec(one, 1..5), 1..8)
 }
 
-fn feature(is_banner: bool, offset: f64) -> FeatureState {
-    if is_banner { banner(offset) } else { chair(offset) }
+/// Where a feature may be.
+fn place() -> impl Strategy<Value = [f64; 3]> {
+    [-50.0..50.0, -50.0..50.0, -10.0..30.0_f64]
+}
+
+/// A box among the places: many a feature is in it, many a one is not, and all three axes matter.
+pub(super) fn part() -> impl Strategy<Value = BoxMm> {
+    let length = prop_oneof![0.0..50.0, Just(200.0)];
+    ([-60.0..50.0, -60.0..50.0, -10.0..30.0_f64], [length.clone(), length.clone(), length]).prop_map(|(low, length)| {
+        let low = [835_567.743_1 + low[0], 817_816.210_8 + low[1], 7.2 + low[2]];
+        let high = [0, 1, 2].map(|axis| low[axis] + length[axis]);
+        BoxMm::new(low.into(), high.into()).expect("ends in order")
+    })
+}
+
+const MESH: &[u8] = b"a mesh";
+
+fn feature(thing: Thing, [east, north, up]: [f64; 3]) -> FeatureState {
+    match thing {
+        Thing::Banner => moved(banner(north), east, up),
+        Thing::Chair => moved(chair(north), east, up),
+        Thing::Tower => {
+            let corner = [835_567.743_1 + east, 817_816.210_8 + north, 7.2 + up];
+            let bounds = BoxMm::new(corner.into(), corner.map(|end| end + 12.0).into()).expect("ends in order");
+            FeatureState::Object { name: "tower".to_owned(), geometry: Digest::of(MESH), bounds }
+        }
+    }
+}
+
+fn moved(mut state: FeatureState, east: f64, up: f64) -> FeatureState {
+    if let FeatureState::Descriptor(descriptor) = &mut state {
+        let points = match descriptor {
+            Descriptor::Material(material) => &mut material.corners[..],
+            Descriptor::Dynamic(dynamic) => std::slice::from_mut(&mut dynamic.position),
+        };
+        for point in points {
+            *point = GridPoint::new(point.easting_m + east, point.northing_m, point.height_m + up);
+        }
+    }
+    state
+}
+
+fn thing_of(state: &FeatureState) -> Thing {
+    match state {
+        FeatureState::Object { .. } => Thing::Tower,
+        FeatureState::Descriptor(Descriptor::Material(_)) => Thing::Banner,
+        FeatureState::Descriptor(Descriptor::Dynamic(_)) => Thing::Chair,
+    }
 }
 
 /// The transaction that makes `moves` on `content`, of version `base`.
@@ -41,10 +97,15 @@ pub(super) fn update(base: u64, content: &Content, moves: &[Move]) -> UpdateTran
     let mut pick = |which: &usize| if free.is_empty() { None } else { Some(free.remove(which % free.len())) };
     for one in moves {
         match one {
-            Move::Add(is_banner, offset) => update.additions.push(feature(*is_banner, *offset)),
-            Move::Change(which, offset) => {
+            Move::Add(thing, place) => {
+                if matches!(thing, Thing::Tower) {
+                    update.add_geometry(MESH.to_vec());
+                }
+                update.additions.push(feature(*thing, *place));
+            }
+            Move::Change(which, place) => {
                 let Some((fid, before)) = pick(which) else { continue };
-                let after = feature(before.kind_name() == "material", *offset);
+                let after = feature(thing_of(before), *place);
                 update.deltas.push(Delta::modify(fid, before.clone(), after));
             }
             Move::Remove(which) => {

@@ -4,12 +4,15 @@ use super::block::{Block, LIVE, Life};
 use super::cell::Cell;
 use super::origin::{IndexBox, IndexOrigin};
 use crate::store::error::Fault;
-use crate::store::rows::FEATURE_COLUMNS;
-use crate::store::states::features;
+use crate::store::rows::{FEATURE_COLUMNS, feature};
 use crate::version::{BoxMm, Feature, Fid, VersionId};
 use rusqlite::{Connection, named_params};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
+
+/// Rows that are not asked for are read over if the next one that is lies no further: finding a row from the root takes as
+/// long as reading some.
+const NEAR_ROWS: i64 = 8;
 
 /// Rows of `feature_version` by their ids.
 pub(in crate::store) struct Ids(String);
@@ -43,7 +46,7 @@ pub(in crate::store) fn state(
     version: VersionId,
     region: &BoxMm,
 ) -> Result<Vec<Feature>, Fault> {
-    fetched(connection, ids_at(connection, version, region)?)
+    fetched(connection, &ids_at(connection, version, region)?)
 }
 
 /// The features in `region` whose state is at `early` and no more at `late`, and those whose state is at `late` and was
@@ -54,9 +57,10 @@ pub(in crate::store) fn difference(
     region: &BoxMm,
 ) -> Result<(Vec<Feature>, Vec<Feature>), Fault> {
     let (before, after) = (ids_at(connection, early, region)?, ids_at(connection, late, region)?);
-    let gone = before.difference(&after).copied().collect();
-    let come = after.difference(&before).copied().collect();
-    Ok((fetched(connection, gone)?, fetched(connection, come)?))
+    let without = |ids: &[i64], other: &[i64]| -> Vec<i64> {
+        ids.iter().copied().filter(|id| other.binary_search(id).is_err()).collect()
+    };
+    Ok((fetched(connection, &without(&before, &after))?, fetched(connection, &without(&after, &before))?))
 }
 
 /// The features in `region` whose state began or ended after `base`.
@@ -122,19 +126,36 @@ pub(in crate::store) fn lives_in(
     Ok(found)
 }
 
-fn ids_at(connection: &Connection, version: VersionId, region: &BoxMm) -> Result<BTreeSet<i64>, Fault> {
+/// By rising id, each once.
+fn ids_at(connection: &Connection, version: VersionId, region: &BoxMm) -> Result<Vec<i64>, Fault> {
     let at = version.0 as i64;
-    Ok(lives_in(connection, region, at..=at)?.iter().map(|life| life.id).collect())
+    let mut ids: Vec<i64> = lives_in(connection, region, at..=at)?.iter().map(|life| life.id).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    Ok(ids)
 }
 
-fn fetched(connection: &Connection, ids: BTreeSet<i64>) -> Result<Vec<Feature>, Fault> {
-    let sql = format!("SELECT {FEATURE_COLUMNS} FROM {} ORDER BY f.fid", Ids::ROWS);
-    let count = ids.len();
-    let found = features(connection, &sql, named_params! {":ids": Ids::of(ids).json()})?;
-    if found.len() == count {
-        return Ok(found);
+/// The features of these rows, by rising number. `ids` rise.
+fn fetched(connection: &Connection, ids: &[i64]) -> Result<Vec<Feature>, Fault> {
+    let sql =
+        format!("SELECT {FEATURE_COLUMNS}, f.id FROM feature_version AS f WHERE f.id BETWEEN ?1 AND ?2 ORDER BY f.id");
+    let mut statement = connection.prepare_cached(&sql)?;
+    let mut features = Vec::with_capacity(ids.len());
+    for run in ids.chunk_by(|id, next| next - id <= NEAR_ROWS) {
+        let mut rows = statement.query([run[0], run[run.len() - 1]])?;
+        let mut wanted = run.iter().peekable();
+        while let Some(row) = rows.next()? {
+            let id: i64 = row.get(4)?;
+            if wanted.next_if_eq(&&id).is_some() {
+                features.push(feature(row)?);
+            }
+        }
+        if let Some(id) = wanted.next() {
+            return Err(Fault::Damage(format!("the index names row {id} of the features, which is not there")));
+        }
     }
-    Err(Fault::Damage(format!("the index names {count} states, of which {} are there", found.len())))
+    features.sort_by_cached_key(|feature| feature.fid);
+    Ok(features)
 }
 
 /// Shows `visit` the blocks in `region` that hold one of `versions`, by cell, the newest first.

@@ -14,6 +14,10 @@ enum Wrong {
     StaleState,
     /// A region is taken for the whole map.
     NoRegion,
+    /// A region is taken for one of all heights.
+    NoHeight,
+    /// A region is taken for one of all eastings.
+    NoEasting,
     /// The way back is the way there.
     OneWay,
     /// Another writer's change since is overwritten.
@@ -30,8 +34,16 @@ struct Faulty {
 }
 
 impl Faulty {
-    fn region<'r>(&self, region: Option<&'r BoxMm>) -> Option<&'r BoxMm> {
-        region.filter(|_| self.wrong != Wrong::NoRegion)
+    fn region(&self, region: Option<&BoxMm>) -> Option<BoxMm> {
+        let axis = match self.wrong {
+            Wrong::NoRegion => return None,
+            Wrong::NoEasting => 0,
+            Wrong::NoHeight => 2,
+            _ => return region.copied(),
+        };
+        let (mut low, mut high) = (region?.min(), region?.max());
+        (low[axis], high[axis]) = (-1_000_000_000_000, 1_000_000_000_000);
+        BoxMm::from_mm(low, high)
     }
 }
 
@@ -43,7 +55,7 @@ impl History for Faulty {
         self.map.version(version)
     }
     fn log(&self, region: Option<&BoxMm>) -> Result<Vec<VersionRecord>, StoreError> {
-        self.map.log(self.region(region))
+        self.map.log(self.region(region).as_ref())
     }
     fn version_at(&self, time: Timestamp) -> Result<VersionId, StoreError> {
         self.map.version_at(time)
@@ -59,7 +71,7 @@ impl History for Faulty {
     }
     fn features(&self, version: VersionId, region: Option<&BoxMm>) -> Result<Vec<Feature>, StoreError> {
         let is_stale = self.wrong == Wrong::StaleState && version.0 > 1;
-        self.map.features(if is_stale { VersionId(version.0 - 1) } else { version }, self.region(region))
+        self.map.features(if is_stale { VersionId(version.0 - 1) } else { version }, self.region(region).as_ref())
     }
     fn features_observed(
         &self,
@@ -117,9 +129,11 @@ impl History for Faulty {
 #[test]
 fn a_store_that_breaks_a_law_is_caught_by_it() {
     type Law = fn(Make<'_>);
-    let laws: [(Wrong, Law); 6] = [
+    let laws: [(Wrong, Law); 8] = [
         (Wrong::StaleState, conformance::every_version_stays_as_it_was_and_is_the_replay_of_its_changes),
         (Wrong::NoRegion, conformance::a_question_about_a_region_is_the_whole_answer_filtered),
+        (Wrong::NoHeight, conformance::a_question_about_a_region_is_the_whole_answer_filtered),
+        (Wrong::NoEasting, conformance::a_question_about_a_region_is_the_whole_answer_filtered),
         (Wrong::OneWay, conformance::a_difference_leads_from_one_version_to_the_other_and_back),
         (Wrong::NoConflicts, conformance::of_two_writers_at_one_place_the_second_is_refused),
         (Wrong::NoKeys, conformance::a_retry_is_committed_once),

@@ -19,6 +19,9 @@ fn changes(scratch: &Scratch, from: u64, to: u64) -> String {
         author: None,
         message: None,
         observed_at: None,
+        map_id: None,
+        base_hash: None,
+        classes: None,
     };
     let (before, after) = (scratch.map.snapshot(from).unwrap(), scratch.map.snapshot(to).unwrap());
     write_change_set(&header, &deltas, (before.classes(), after.classes()), &geometries).unwrap()

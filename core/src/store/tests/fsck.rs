@@ -33,6 +33,7 @@ pub(super) fn eventful() -> Scratch {
 fn seen(capture: &[u8], labels: Option<&[u8]>) -> Observation {
     Observation {
         capture: Digest::of(capture),
+        photo: None,
         taken_at: Some(at(2)),
         labels: labels.map(<[u8]>::to_vec),
         prior: None,

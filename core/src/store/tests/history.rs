@@ -64,6 +64,7 @@ pub(super) fn observation(decision: Decision) -> Observation {
     };
     Observation {
         capture: Digest::of(b"capture"),
+        photo: Some(Digest::of(b"photo")),
         taken_at: Some(at(-5)),
         labels: Some(b"png".to_vec()),
         prior: Some(Prior {

@@ -104,12 +104,20 @@ fn a_read_only_file_can_be_read_and_not_written() {
 #[cfg(unix)]
 #[test]
 fn a_map_in_a_directory_that_cannot_be_written_can_be_read() {
+    use std::os::unix::ffi::OsStrExt;
     use std::os::unix::fs::PermissionsExt;
     let Scratch { directory, map } = Scratch::with_two_features();
-    let path = directory.path().join("what%20a?name#.rsv");
-    let made = map.path().to_owned();
+    let mut path = map.path().to_owned();
     drop(map);
-    fs::rename(made, &path).unwrap();
+    // The last one is no text in any encoding.
+    for name in [&b"what%20a?name#.rsv"[..], "街.rsv".as_bytes(), b"\xff.rsv"] {
+        let renamed = directory.path().join(std::ffi::OsStr::from_bytes(name));
+        fs::rename(path, &renamed).unwrap();
+        path = renamed;
+        fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o555)).unwrap();
+        assert_eq!(MapFile::open_read_only(&path).unwrap().head(), Ok(VersionId(1)));
+        fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o755)).unwrap();
+    }
     fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o555)).unwrap();
     let reader = MapFile::open_read_only(&path).unwrap();
     let region = BoxMm::of_plan(835_567.0, 817_800.0, 835_568.0, 817_830.0).unwrap();
@@ -117,7 +125,7 @@ fn a_map_in_a_directory_that_cannot_be_written_can_be_read() {
     assert_eq!(found.len(), 1);
     fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let beside: Vec<_> = fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    assert_eq!(beside, ["what%20a?name#.rsv"]);
+    assert_eq!(beside, [path.file_name().unwrap()]);
 }
 
 #[test]
@@ -132,6 +140,22 @@ fn another_writer_is_waited_for_and_then_named() {
     assert_eq!(scratch.map.head(), Ok(VersionId(1)));
     other.execute_batch("ROLLBACK").unwrap();
     assert_eq!(scratch.add(1, &[chair(1.0)]), Ok(VersionId(2)));
+}
+
+#[test]
+fn a_writer_waits_for_the_turn_of_another_until_it_ends() {
+    let scratch = Scratch::with_two_features();
+    let other = MapFile::open(scratch.map.path()).unwrap();
+    scratch.map.set_busy_timeout(Duration::from_millis(20)).unwrap();
+    let turn = other.take_turn().unwrap();
+    let path = scratch.map.path().to_owned();
+    assert_eq!(scratch.add(1, &[chair(1.0)]), Err(CommitError::Store(StoreError::Busy { path: path.clone() })));
+    // Writing the file anew moves the log too.
+    assert_eq!(scratch.map.compact(), Err(StoreError::Busy { path }));
+    assert_eq!(scratch.map.head(), Ok(VersionId(1)));
+    drop(turn);
+    assert_eq!(scratch.add(1, &[chair(1.0)]), Ok(VersionId(2)));
+    assert_eq!(scratch.map.compact(), Ok(()));
 }
 
 #[test]

@@ -57,6 +57,35 @@ fn several_proposals_of_one_capture_share_its_evidence() {
 }
 
 #[test]
+fn what_a_proposal_looked_at_counts_once_it_is_accepted() {
+    let scratch = Scratch::with_two_features();
+    let id = scratch.map.propose(&looking(1, 200.0, vec![chair(215.0)]), at(2)).unwrap();
+    assert_eq!(scratch.map.accept(id, "ada", "", at(3)), Ok(VersionId(2)));
+    // Where the photo behind it saw no chair, a writer who does not know of it puts one.
+    let refused = scratch.map.commit(&looking(1, 175.0, vec![chair(190.0)]), at(4));
+    assert!(matches!(refused, Err(CommitError::Conflict { looked_at, .. }) if looked_at == [VersionId(2)]));
+    assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+}
+
+#[test]
+fn what_is_done_together_is_done_whole_or_not_at_all() {
+    let scratch = Scratch::with_two_features();
+    let both = |second: f64| {
+        scratch.map.together(|map| -> Result<_, CommitError> {
+            map.commit(&UpdateTransaction { additions: vec![chair(1.0)], ..transaction(1) }, at(2))?;
+            // A part that is refused leaves the rest of the work alone; what becomes of that is for the work to say.
+            let alone = map.commit(&UpdateTransaction { additions: vec![chair(f64::NAN)], ..transaction(2) }, at(2));
+            assert!(matches!(alone, Err(CommitError::State { .. })));
+            map.commit(&UpdateTransaction { additions: vec![chair(second)], ..transaction(2) }, at(3))
+        })
+    };
+    assert!(matches!(both(f64::NAN), Err(CommitError::State { .. })));
+    assert_eq!(scratch.map.head(), Ok(VersionId(1)));
+    assert_eq!(both(2.0), Ok(VersionId(3)));
+    assert_eq!(scratch.map.fsck(), Ok(Vec::new()));
+}
+
+#[test]
 fn what_is_confirmed_closes_its_proposals_or_nothing_happens() {
     let scratch = Scratch::with_two_features();
     let propose = |offset: f64| {

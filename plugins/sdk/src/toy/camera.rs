@@ -1,4 +1,4 @@
-//! The pinhole camera of `docs/conventions.md`: x right, y down, z forward; yaw clockwise from grid north, pitch up,
+//! The pinhole camera of `docs/architecture.md`: x right, y down, z forward; yaw clockwise from grid north, pitch up,
 //! roll right side down.
 
 use resurvey_schema::{CameraModel, GridPoint, Intrinsics, Pose};

@@ -1,16 +1,18 @@
 //! The host's services on the toy world, and captures of it.
 
 use super::camera::{ToyCamera, add, dot, norm, offset, scale};
+use super::compare;
 use super::scene::{Face, ToyScene};
 use crate::host::Host;
-use crate::image::{Comparison, ImageRef, View, ViewImages};
-use crate::kinds::Error;
+use crate::image::{Comparison, ImageRef, ViewImages};
+use crate::kinds::{Error, Photo};
 use resurvey_schema::service::{
-    ClassCounts, CompareRequest, Level, PanoramaRequest, PoseEstimate, RayHit, ViewCounts, ViewFeature,
+    ClassCounts, CompareRequest, Level, PanoramaRequest, PoseEstimate, Prior, RayHit, ViewCounts, ViewFeature,
 };
 use resurvey_schema::{ClassId, ClassTable, Descriptor, GridPoint, Intrinsics, Pose, Wgs84};
 
-/// A host whose map is a [`ToyScene`]. It has no photo and no map projection: comparing and WGS84 are errors.
+/// A host whose map is a [`ToyScene`]. It has no map projection: WGS84 is an error. So are comparisons before there is a
+/// photo.
 #[derive(Clone, Debug)]
 pub struct ToyHost {
     /// The map.
@@ -19,6 +21,11 @@ pub struct ToyHost {
     pub camera: Intrinsics,
     /// The class table.
     pub classes: ClassTable,
+    /// Labels of the capture's photo, row-major; empty where there is none.
+    pub photo_labels: Vec<u8>,
+    /// What [`Host::cancelled`] says: set it to see what a plugin makes of a cancel.
+    pub is_cancelled: bool,
+    is_placeless: bool,
 }
 
 /// A photo and the view of a map at the pose that a matcher found, ready for a detector.
@@ -27,7 +34,6 @@ pub struct ToyCapture {
     /// Labels of the photo, row-major.
     pub photo: Vec<u8>,
     view: ViewImages,
-    features: Vec<ViewFeature>,
     camera: Intrinsics,
     estimate: PoseEstimate,
 }
@@ -35,7 +41,13 @@ pub struct ToyCapture {
 impl ToyHost {
     /// A host of `scene` with the default classes.
     pub fn new(scene: ToyScene, camera: Intrinsics) -> Self {
-        Self { scene, camera, classes: ClassTable::default() }
+        let (photo_labels, is_cancelled, is_placeless) = (Vec::new(), false, false);
+        Self { scene, camera, classes: ClassTable::default(), photo_labels, is_cancelled, is_placeless }
+    }
+
+    /// The host as a segmenter has it, before anybody knows where the photo was taken: every service of the map is an error.
+    pub fn placeless(&self) -> Self {
+        Self { is_placeless: true, ..self.clone() }
     }
 
     /// What a photo of this world taken at `pose` shows.
@@ -43,15 +55,51 @@ impl ToyHost {
         self.images(pose, 1, true).labels
     }
 
+    /// What a camera at `pose` would take in the colours of the classes, row-major: red, green, blue.
+    pub fn picture(&self, pose: &Pose) -> Vec<[u8; 3]> {
+        let colour = |label: &u8| self.classes.get(ClassId(*label)).map_or([0; 3], |class| class.colour);
+        self.labels(pose).iter().map(colour).collect()
+    }
+
+    /// The capture that a matcher in `search` form gets; `None` until `photo_labels` fill the camera's image.
+    pub fn photo(&self, prior: Prior) -> Option<Photo<'_>> {
+        let Intrinsics { width, height, .. } = self.camera;
+        let is_whole = !self.photo_labels.is_empty() && self.photo_labels.len() == width as usize * height as usize;
+        let labels = ImageRef::new(&self.photo_labels, width, height, width as usize).filter(|_| is_whole)?;
+        Some(Photo { labels, camera: self.camera, prior })
+    }
+
     /// `photo` beside the view of this map at the pose of `estimate`.
     pub fn capture(&self, photo: Vec<u8>, estimate: PoseEstimate) -> ToyCapture {
-        let features = self
-            .scene
-            .descriptors
-            .iter()
-            .map(|(fid, descriptor)| ViewFeature { fid: *fid, class: descriptor.class() })
-            .collect();
-        ToyCapture { photo, view: self.images(&estimate.pose, 1, true), features, camera: self.camera, estimate }
+        ToyCapture { photo, view: self.images(&estimate.pose, 1, true), camera: self.camera, estimate }
+    }
+
+    fn map(&self) -> Result<&ToyScene, Error> {
+        if self.is_placeless {
+            return Err("a segmenter has no map: nobody knows yet where the photo was taken".into());
+        }
+        Ok(&self.scene)
+    }
+
+    fn feature_table(&self) -> Vec<ViewFeature> {
+        let feature = |(fid, descriptor): &(u64, Descriptor)| ViewFeature { fid: *fid, class: descriptor.class() };
+        self.scene.descriptors.iter().map(feature).collect()
+    }
+
+    /// The view at `pose` beside the photo.
+    fn compared(&self, request: &CompareRequest, pose: &Pose) -> Result<ViewCounts, Error> {
+        if self.photo_labels.len() != self.camera.width as usize * self.camera.height as usize {
+            return Err("the toy host has no photo to compare with: set photo_labels".into());
+        }
+        let view = self.images(pose, request.stride, true);
+        let kept = |index: &usize| {
+            let stride = request.stride.max(1) as usize;
+            let width = self.camera.width as usize;
+            (index % width).is_multiple_of(stride) && (index / width).is_multiple_of(stride)
+        };
+        let photo: Vec<u8> = (0..self.photo_labels.len()).filter(kept).map(|index| self.photo_labels[index]).collect();
+        let slots = self.classes.iter().map(|class| usize::from(class.index.0) + 1).max().unwrap_or(0);
+        Ok(compare::counts(&photo, &view.labels, view.width as usize, slots, request))
     }
 
     fn sky(&self) -> ClassId {
@@ -71,6 +119,7 @@ impl ToyHost {
             range_m: vec![f32::INFINITY; size],
             points: vec![[f32::NAN; 3]; size],
             features: vec![0; size],
+            feature_table: self.feature_table(),
         };
         let mut nearest = vec![f64::INFINITY; size];
         let mut set = |column: u32, row: u32, ray: [f64; 3], times: f64, class: ClassId, feature: u32| {
@@ -153,20 +202,10 @@ impl ToyCapture {
     /// What the detector and the estimator get.
     pub fn comparison(&self) -> Comparison<'_> {
         let (width, height) = (self.view.width, self.view.height);
-        fn raster<T: Copy>(data: &[T], width: u32, height: u32) -> ImageRef<'_, T> {
-            ImageRef::new(data, width, height, width as usize)
-                .expect("invariant: every raster has width × height values")
-        }
+        let photo = ImageRef::new(&self.photo, width, height, width as usize);
         Comparison {
-            photo: raster(&self.photo, width, height),
-            view: View {
-                origin: self.view.origin,
-                labels: raster(&self.view.labels, width, height),
-                range_m: raster(&self.view.range_m, width, height),
-                points: raster(&self.view.points, width, height),
-                features: raster(&self.view.features, width, height),
-                feature_table: &self.features,
-            },
+            photo: photo.expect("invariant: the photo has the size of the camera"),
+            view: self.view.view(),
             camera: self.camera,
             estimate: self.estimate,
         }
@@ -183,28 +222,47 @@ impl Host for ToyHost {
     }
 
     fn render(&self, stride: u32, with_descriptors: bool, poses: &[Pose]) -> Result<Vec<ViewImages>, Error> {
+        self.map()?;
         Ok(poses.iter().map(|pose| self.images(pose, stride, with_descriptors)).collect())
     }
 
-    fn compare_views(&self, _: &CompareRequest, _: &[Pose]) -> Result<Vec<ViewCounts>, Error> {
-        not_offered("compare_views")
+    fn compare_views(&self, request: &CompareRequest, poses: &[Pose]) -> Result<Vec<ViewCounts>, Error> {
+        self.map()?;
+        poses.iter().map(|pose| self.compared(request, pose)).collect()
     }
 
-    fn compare_panoramas(&self, _: &PanoramaRequest, _: &[GridPoint]) -> Result<Vec<ClassCounts>, Error> {
-        not_offered("compare_panoramas")
+    /// Compares a view at every heading: it counts pixels where the host counts cells of a panorama, and shares are alike.
+    fn compare_panoramas(&self, request: &PanoramaRequest, positions: &[GridPoint]) -> Result<Vec<ClassCounts>, Error> {
+        self.map()?;
+        let PanoramaRequest { pitch_rad, roll_rad, ignored_in_photo, ignored_in_view, .. } = *request;
+        let views = CompareRequest { stride: 1, ignored_in_photo, ignored_in_view, boundary_tolerance_px: 0.0 };
+        let step_rad = std::f64::consts::TAU / f64::from(request.columns.max(1));
+        let first = (request.first_yaw_rad / step_rad).round();
+        let mut counts = Vec::new();
+        for position in positions {
+            for heading in 0..request.yaw_count {
+                let column = first + f64::from(heading) * f64::from(request.yaw_step_columns);
+                let pose = Pose { position: *position, yaw_rad: column * step_rad, pitch_rad, roll_rad };
+                counts.extend(self.compared(&views, &pose)?);
+            }
+        }
+        Ok(counts)
     }
 
     fn inside_solid(&self, positions: &[GridPoint]) -> Result<Vec<bool>, Error> {
+        self.map()?;
         Ok(vec![false; positions.len()])
     }
 
     fn pixel_rays(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Result<Vec<[f64; 3]>, Error> {
+        self.map()?;
         let camera = ToyCamera::new(self.camera, *pose);
         let unit = |ray: [f64; 3]| scale(ray, 1.0 / norm(ray));
         Ok(pixels.iter().map(|pixel| unit(camera.ray_at_unit_depth(*pixel))).collect())
     }
 
     fn project(&self, pose: &Pose, points: &[GridPoint]) -> Result<Vec<Option<[f64; 2]>>, Error> {
+        self.map()?;
         let camera = ToyCamera::new(self.camera, *pose);
         Ok(points.iter().map(|point| camera.project(*point)).collect())
     }
@@ -216,7 +274,7 @@ impl Host for ToyHost {
         limit_m: f64,
         with_descriptors: bool,
     ) -> Result<Vec<Option<RayHit>>, Error> {
-        let faces = self.scene.faces(with_descriptors);
+        let faces = self.map()?.faces(with_descriptors);
         let within = |hit: &RayHit| hit.range_m <= limit_m;
         Ok(directions.iter().map(|direction| self.cast(&faces, origin, *direction).filter(within)).collect())
     }
@@ -225,11 +283,11 @@ impl Host for ToyHost {
         let near = |(_, descriptor): &&(u64, Descriptor)| {
             norm(add(<[f64; 3]>::from(descriptor.anchor()), scale(point.into(), -1.0))) <= radius_m
         };
-        Ok(self.scene.descriptors.iter().filter(near).cloned().collect())
+        Ok(self.map()?.descriptors.iter().filter(near).cloned().collect())
     }
 
     fn ground_height(&self, point: GridPoint) -> Result<Option<f64>, Error> {
-        let faces = self.scene.faces(false);
+        let faces = self.map()?.faces(false);
         Ok(self.cast(&faces, point, [0.0, 0.0, -1.0]).map(|hit| hit.point.height_m))
     }
 
@@ -251,6 +309,6 @@ impl Host for ToyHost {
     fn progress(&self, _: f64) {}
 
     fn cancelled(&self) -> bool {
-        false
+        self.is_cancelled
     }
 }

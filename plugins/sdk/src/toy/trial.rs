@@ -1,10 +1,28 @@
-//! Trying a matcher in `score` form: flat label images, and a street corner around which it looks for the camera.
+//! Trying a plugin: its settings as the host completes them, and for a matcher in `score` form flat label images and a
+//! street corner around which it looks for the camera.
 
 use super::{Paint, ToyCamera, ToyHost, ToyScene};
 use crate::host::Host;
-use crate::image::{ImageRef, View, ViewImages};
-use crate::kinds::{Error, Scorer};
+use crate::image::{ImageRef, ViewImages};
+use crate::kinds::{Error, Plugin, Scorer};
 use resurvey_schema::{ClassId, GridPoint, Intrinsics, Pose};
+use serde_json::Value;
+
+/// A plugin with the defaults of its schema but for `changed`, a JSON object such as `{"least_px": 20}`; the host's checks
+/// of names and ranges are not made.
+pub fn create<T: Plugin>(changed: &str) -> Result<T, Error> {
+    type Object = serde_json::Map<String, Value>;
+    let object = |what: &str, text: &str| {
+        serde_json::from_str::<Object>(text)
+            .map_err(|error| Error(format!("{what}: expected a JSON object, found {error}")))
+    };
+    let schema = if T::SETTINGS.is_empty() { Object::new() } else { object("SETTINGS", T::SETTINGS)? };
+    let properties = schema.get("properties").and_then(Value::as_object).cloned().unwrap_or_default();
+    let default = |(name, schema): (String, Value)| schema.get("default").map(|default| (name, default.clone()));
+    let mut settings: Object = properties.into_iter().filter_map(default).collect();
+    settings.extend(object("changed settings", changed)?);
+    T::create(serde_json::from_value(settings.into()).map_err(|error| format!("settings: {error}"))?)
+}
 
 /// Labels with a range a pixel, as a photo or as a view.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +56,7 @@ impl Labels {
             range_m: view.range_m.clone(),
             points: vec![[0.0; 3]; view.labels.len()],
             features: vec![0; view.labels.len()],
+            feature_table: Vec::new(),
         };
         scored(scorer, &self.labels, &images)
     }
@@ -90,19 +109,7 @@ fn pose([east_m, north_m, turn_deg]: [f64; 3]) -> Pose {
 
 fn scored(scorer: &mut impl Scorer, photo: &[u8], view: &ViewImages) -> Result<f64, Error> {
     let (width, height) = (view.width, view.height);
-    let misfit = || Error(format!("expected rasters of {width}×{height} pixels"));
-    fn raster<T: Copy>(data: &[T], [width, height]: [u32; 2]) -> Option<ImageRef<'_, T>> {
-        ImageRef::new(data, width, height, width as usize)
-    }
-    let size = [width, height];
-    let photo = raster(photo, size).ok_or_else(misfit)?;
-    let view = View {
-        origin: view.origin,
-        labels: raster(&view.labels, size).ok_or_else(misfit)?,
-        range_m: raster(&view.range_m, size).ok_or_else(misfit)?,
-        points: raster(&view.points, size).ok_or_else(misfit)?,
-        features: raster(&view.features, size).ok_or_else(misfit)?,
-        feature_table: &[],
-    };
-    scorer.score(photo, &view)
+    let photo = ImageRef::new(photo, width, height, width as usize);
+    let photo = photo.ok_or_else(|| format!("expected a photo of {width}×{height} pixels, as the view"))?;
+    scorer.score(photo, &view.view())
 }
