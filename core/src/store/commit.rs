@@ -14,7 +14,7 @@ use super::plan::{check_new_classes, check_numbers, check_request, check_states,
 use super::rows::{VersionRow, classes_at, head, insert_classes};
 use super::seal;
 use super::states::last_state;
-use crate::version::{Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
+use crate::version::{BoxMm, Digest, Fid, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use rusqlite::{Connection, OptionalExtension, named_params};
 
@@ -56,7 +56,7 @@ pub(super) fn make_unseen_version(
         VersionKind::Revert => Vec::new(),
         _ => looked_at_since(connection, transaction)?,
     };
-    match make_version(connection, transaction, evidence, now) {
+    match make_version(connection, transaction, (evidence, transaction.viewed_region.as_ref()), now) {
         Err(WriteFault::Refused(CommitError::Conflict { base, head, changed, .. })) => {
             refuse(CommitError::Conflict { base, head, changed, looked_at: seen })
         }
@@ -70,11 +70,11 @@ pub(super) fn make_unseen_version(
     }
 }
 
-/// Writes the next version, all but the row of its evidence.
+/// Writes the next version, all but the row of its evidence. `looked_at` is what its writer looked at.
 pub(super) fn make_version(
     connection: &Connection,
     transaction: &UpdateTransaction,
-    evidence: Option<Digest>,
+    (evidence, looked_at): (Option<Digest>, Option<&BoxMm>),
     now: Timestamp,
 ) -> Result<VersionRecord, Refused> {
     let head = head(connection)?;
@@ -91,7 +91,7 @@ pub(super) fn make_version(
     if let Some(classes) = &transaction.classes {
         insert_classes(connection, plan.record.version, classes)?;
     }
-    insert_looked_at(connection, plan.record.version, transaction.viewed_region.as_ref())?;
+    insert_looked_at(connection, plan.record.version, looked_at)?;
     seal::VERSION.seal(connection, &(plan.record.version.0 as i64))?;
     insert_geometries(connection, transaction)?;
     write_rows(connection, &plan, &live)?;

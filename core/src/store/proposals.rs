@@ -3,7 +3,6 @@
 use super::commit::{make_unseen_version, make_version};
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
-use super::looked_at::insert_looked_at;
 use super::map_file::{MapFile, WriteFault};
 use super::observations::{Evidence, digest_of, link};
 use super::plan::{check_request, check_states};
@@ -157,8 +156,7 @@ impl MapFile {
             let mut transaction = proposal.transaction;
             let viewed_region = transaction.viewed_region.take();
             let evidence = proposal.observation.map(|id| digest_of(connection, id)).transpose()?;
-            let record = make_version(connection, &transaction, evidence, now)?;
-            insert_looked_at(connection, record.version, viewed_region.as_ref())?;
+            let record = make_version(connection, &transaction, (evidence, viewed_region.as_ref()), now)?;
             if let Some(observation) = proposal.observation {
                 link(connection, observation, record.version)?;
             }

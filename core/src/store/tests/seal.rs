@@ -116,6 +116,7 @@ fn the_state_of_a_version_stays_proven_when_the_way_to_it_is_forgotten() {
             problems.iter().any(|one| one.starts_with(&expected)),
             "{sql}\nexpected {expected}\nfound {problems:#?}"
         );
+        scratch.map.untag("surveyed").unwrap();
         let error = scratch.map.gc(Some(VersionId(5)), at(10)).unwrap_err();
         assert!(matches!(error, StoreError::Damaged { .. }), "{error}");
     }
