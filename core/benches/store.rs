@@ -56,6 +56,32 @@ fn main() {
     }
 }
 
+/// Where the features of one transaction of a load stand.
+#[derive(Clone, Copy)]
+enum Order {
+    /// In a strip of the square, as a survey comes in tiles.
+    Strips,
+    /// Anywhere in it: each transaction changes nearly every cell of the index.
+    Everywhere,
+}
+
+impl Order {
+    /// From which share of the side to which, of the transaction that begins after `start` of `features`.
+    fn strip(self, start: usize, count: usize, features: usize) -> [f64; 2] {
+        match self {
+            Self::Strips => [start, start + count].map(|end| end as f64 / features as f64),
+            Self::Everywhere => [0.0, 1.0],
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Strips => "strip by strip",
+            Self::Everywhere => "everywhere at once",
+        }
+    }
+}
+
 /// A map while it is measured.
 struct Bench {
     map: MapFile,
@@ -66,9 +92,11 @@ struct Bench {
 
 fn measure(directory: &Path, features: usize) {
     println!("\n{features} features");
-    let map = new_map(&directory.join(format!("{features}.rsv")));
-    let mut bench = Bench { map, random: Random(7), side_m: side_m(features), head: VersionId(0) };
-    bench.load(features);
+    let strips = directory.join("strips.rsv");
+    Bench::new(&strips, features).load(features, Order::Strips);
+    std::fs::remove_file(&strips).expect("the map is removed");
+    let mut bench = Bench::new(&directory.join(format!("{features}.rsv")), features);
+    bench.load(features, Order::Everywhere);
     let first = bench.head;
     let elsewhere = square(bench.side_m, 0.25, 100.0);
     bench.region("100 m", &elsewhere, first);
@@ -117,12 +145,17 @@ fn compare(bench: &Bench, directory: &Path, here: &[(VersionId, (Times, usize))]
 }
 
 impl Bench {
-    fn load(&mut self, features: usize) {
+    fn new(path: &Path, features: usize) -> Self {
+        Self { map: new_map(path), random: Random(7), side_m: side_m(features), head: VersionId(0) }
+    }
+
+    fn load(&mut self, features: usize, order: Order) {
         let (mut seconds, mut cpu_seconds) = (0.0, 0.0);
         for start in (0..features).step_by(LOADED_AT_ONCE) {
             let mut load = transaction(self.head);
             let count = LOADED_AT_ONCE.min(features - start);
-            load.additions = (0..count).map(|_| self.random.banner(self.side_m)).collect();
+            let strip = order.strip(start, count, features);
+            load.additions = (0..count).map(|_| self.random.banner(self.side_m, strip)).collect();
             let (start, cpu_start) = (Instant::now(), cpu_s());
             self.head = self.map.commit(&load, now()).expect("a commit");
             seconds += start.elapsed().as_secs_f64();
@@ -130,14 +163,15 @@ impl Bench {
         }
         let each = self.bytes() as f64 / features as f64;
         let [wall, cpu] = [seconds, cpu_seconds].map(|seconds| features as f64 / seconds);
-        println!("  bulk load: {wall:.0} features/s, {cpu:.0} per second on a processor, {each:.0} B each");
+        let order = order.words();
+        println!("  bulk load, {order}: {wall:.0} features/s, {cpu:.0} per second on a processor, {each:.0} B each");
     }
 
     fn commits(&mut self) {
         let before = self.bytes();
         let (time, _) = median(RUNS, || {
             let mut update = transaction(self.head);
-            update.additions = (0..10).map(|_| self.random.banner(self.side_m)).collect();
+            update.additions = (0..10).map(|_| self.random.banner(self.side_m, [0.0, 1.0])).collect();
             self.head = self.map.commit(&update, now()).expect("a commit");
             0
         });

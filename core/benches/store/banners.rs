@@ -33,9 +33,9 @@ impl Random {
         Uncertainty { position_m: 0.05 + self.next(), size_m: Some(0.1), area_m2: Some(0.3) }
     }
 
-    /// A banner of 3 × 2 m somewhere in a square of `side_m`.
-    pub fn banner(&mut self, side_m: f64) -> FeatureState {
-        let (e, n) = (EAST_M + side_m * self.next(), NORTH_M + side_m * self.next());
+    /// A banner of 3 × 2 m somewhere in a square of `side_m`, between these shares of its height.
+    pub fn banner(&mut self, side_m: f64, [south, north]: [f64; 2]) -> FeatureState {
+        let (e, n) = (EAST_M + side_m * self.next(), NORTH_M + side_m * (south + (north - south) * self.next()));
         let corner = |de, dh| GridPoint::new(e + de, n, 8.0 + dh);
         FeatureState::Descriptor(Descriptor::Material(MaterialDescriptor {
             class: ClassId(3),

@@ -23,7 +23,7 @@ pub fn write(arguments: &[String]) {
     let (mut random, mut sent, mut busy) = (Random(number + 1), 0_u64, 0);
     while Instant::now() < end {
         let mut update = transaction(map.head().expect("a head"));
-        update.additions = (0..ADDED).map(|_| random.banner(side_m(100_000))).collect();
+        update.additions = (0..ADDED).map(|_| random.banner(side_m(100_000), [0.0, 1.0])).collect();
         update.idempotency_key = Some(format!("{number}-{sent}"));
         let made = loop {
             match map.commit(&update, now()) {
