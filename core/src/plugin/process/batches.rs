@@ -12,8 +12,8 @@ use crate::plugin::lend;
 use resurvey_schema::service::ViewFeature;
 use resurvey_schema::wire::{Array, Dtype, ScoreCall, ToPlugin, WireViews};
 
-/// Bytes of the views of one batch: they should stay in the cache of a core.
-const BATCH_BYTES: usize = 1 << 20;
+/// Bytes of the views of one batch: few enough to stay in the cache of a core, so many that a message costs little.
+const BATCH_BYTES: usize = 2 << 20;
 /// Views of a batch at most.
 const MOST_VIEWS: usize = 64;
 /// Batches that are filled or scored at a time.

@@ -1,14 +1,18 @@
 //! Lines of JSON over a socket.
 
 use resurvey_schema::wire::LONGEST_LINE;
+use rustix::io::Errno;
+use rustix::net::{RecvFlags, recv};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A turn of waiting, after which whoever waits looks around.
 const SLICE: Duration = Duration::from_millis(20);
+/// How long to look for what comes at once before sleeping: to be woken takes longer than most answers.
+const EAGER: Duration = Duration::from_micros(30);
 /// Bytes of a bad line that a message shows.
 const SHOWN: usize = 80;
 
@@ -96,7 +100,7 @@ impl Wire {
         if self.buffer.len() < self.end + ROOM {
             self.buffer.resize(2 * (self.end + ROOM), 0);
         }
-        match self.stream.read(&mut self.buffer[self.end..]) {
+        match self.read() {
             Ok(0) if self.end > 0 => Err(garbage(&self.buffer[..self.end], &"the wire ended in the middle of a line")),
             Ok(0) => Err(Silence::Ended),
             Ok(bytes) => {
@@ -105,6 +109,18 @@ impl Wire {
             }
             Err(error) if is_pause(&error) => Err(Silence::Waiting),
             Err(_) => Err(Silence::Ended),
+        }
+    }
+
+    fn read(&mut self) -> io::Result<usize> {
+        let (began, room) = (Instant::now(), &mut self.buffer[self.end..]);
+        loop {
+            match recv(&self.stream, &mut *room, RecvFlags::DONTWAIT) {
+                // Others that have work go first.
+                Err(Errno::AGAIN) if began.elapsed() < EAGER => std::thread::yield_now(),
+                Err(Errno::AGAIN) => return self.stream.read(room),
+                read => return Ok(read?.1),
+            }
         }
     }
 }
