@@ -214,11 +214,23 @@ impl From<CommitError> for Failure {
             CommitError::NothingToRevert { version, .. } => Self::new(NOTHING, error).with_document(json!({
                 "decision": "nothing", "reverts": version.0, "version": null, "added": 0, "modified": 0, "removed": 0,
             })),
-            CommitError::OtherRequest { .. } | CommitError::OtherProposal { .. } => Self::new(CONFLICT, error),
+            CommitError::OtherRequest { ref key, version, .. } => {
+                let document = other_request(key, &json!({ "version": version.0 }));
+                Self::new(CONFLICT, error).with_document(document)
+            }
+            CommitError::OtherProposal { ref key, id } => {
+                let document = other_request(key, &json!({ "proposal": id }));
+                Self::new(CONFLICT, error).with_document(document)
+            }
             CommitError::Store(error) => error.into(),
             _ => Self::new(INPUT, error),
         }
     }
+}
+
+/// The document of a key that went with another request, which `made` something.
+fn other_request(key: &str, made: &Value) -> Value {
+    json!({ "decision": "conflict", "version": null, "idempotency_key": key, "made": made })
 }
 
 /// The document of a conflict.

@@ -27,6 +27,9 @@ fn another_change_set_under_the_same_key_is_refused_and_neither_lost_nor_taken_f
     let both = ["key \"k\" made version 1 for the apply", "comes with the apply", "another key"];
     bench.run("apply", &[&other, "--idempotency-key", "k"]).refused(21, &both);
     bench.run("revert", &["1", "--idempotency-key", "k"]).refused(21, &["for the apply", "comes with the revert"]);
+    let told = bench.run("apply", &[&other, "--idempotency-key", "k", "--json"]).json();
+    let made = json!({"version": 1});
+    assert_eq!(told, json!({"decision": "conflict", "version": null, "idempotency_key": "k", "made": made}));
     assert_eq!(bench.json("apply", &[&other, "--idempotency-key", "l"])["version"], 2);
     assert_eq!(bench.head(), 2);
 }
