@@ -84,8 +84,10 @@ impl Failure {
     /// The same, naming `file` where the message does not; what is wrong with the map is not the file's doing.
     pub fn about(self, file: &Path) -> Self {
         let place = file.display().to_string();
-        let is_of_map =
-            matches!(self.error.downcast_ref(), Some(StoreError::Busy { .. } | StoreError::Internal { .. }));
+        let is_of_map = matches!(
+            self.error.downcast_ref(),
+            Some(StoreError::Busy { .. } | StoreError::WrittenMeanwhile { .. } | StoreError::Internal { .. })
+        );
         if self.code == MAP || is_of_map || names(&self.to_string(), &place) {
             self
         } else {
@@ -180,7 +182,7 @@ impl From<StoreError> for Failure {
             | StoreError::NoWriteAheadLog { .. }
             | StoreError::Full { .. }
             | StoreError::Io { .. } => MAP,
-            StoreError::Busy { .. } => CONFLICT,
+            StoreError::Busy { .. } | StoreError::WrittenMeanwhile { .. } => CONFLICT,
             StoreError::Internal { .. } => INTERNAL,
             StoreError::NotFound { .. }
             | StoreError::NoSuchVersion { .. }
@@ -196,7 +198,9 @@ impl From<StoreError> for Failure {
             _ => INPUT,
         };
         let document = match &error {
-            StoreError::Busy { .. } => Some(json!({ "decision": "busy", "version": null })),
+            StoreError::Busy { .. } | StoreError::WrittenMeanwhile { .. } => {
+                Some(json!({ "decision": "busy", "version": null }))
+            }
             StoreError::ProposalDecided { id, status } => {
                 Some(json!({ "decision": "conflict", "id": id, "status": status, "version": null }))
             }

@@ -5,6 +5,7 @@ use crate::args::{ProposalAction, Proposals};
 use crate::commands::evidence;
 use crate::conflict::refused;
 use crate::console::Console;
+use crate::document;
 use crate::failure::{CONFLICT, Failure, conflict};
 use crate::plain::plain;
 use comfy_table::{Table, presets};
@@ -156,13 +157,15 @@ fn refuse_what_is_there(map: &MapFile, proposal: &Proposal) -> Result<(), Failur
             let next = format!("look at both with \"resurvey why\" and \"proposals show {}\"", proposal.id);
             let text = format!("feature {fid} is where proposal {} puts its own; {next}", proposal.id);
             let there = map.feature(head, Fid(fid))?;
+            let found = document::state(&there.state, snapshot.classes())?;
             let change = ConflictingChange {
                 fid: there.fid,
                 changed_in: Some(there.from),
                 found: Some(there.state),
                 is_target: false,
             };
-            let document = conflict(proposal.transaction.base, head, &[change], &[]);
+            let mut document = conflict(proposal.transaction.base, head, &[change], &[]);
+            document["conflicts"][0]["found"] = found.into();
             let failure = Failure::new(CONFLICT, anyhow::anyhow!(text)).with_document(document);
             return Err(of_proposal(failure, proposal));
         }

@@ -185,7 +185,7 @@ fn list(changed: &[ConflictingChange], looked_at: &[VersionId]) -> String {
         let place = if change.is_target { "" } else { " in the viewed region" };
         match change.changed_in {
             Some(version) => format!("feature {}{place} (version {version})", change.fid),
-            None => format!("feature {} was never there", change.fid),
+            None => format!("feature {} is in no version that is kept", change.fid),
         }
     };
     let seen = |version: &VersionId| format!("version {version} looked at a place that this changes");

@@ -53,8 +53,14 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// It cannot be locked here, and somebody else wrote to it while it was read.
+    #[error("{}: somebody else wrote to the map while it was read, and this user cannot lock it; try again, or read a copy", .path.display())]
+    WrittenMeanwhile {
+        /// The file.
+        path: PathBuf,
+    },
     /// Only reading is allowed.
-    #[error("{}: the map is read-only; expected a file and a directory that can be written", .path.display())]
+    #[error("{}: read-only; expected a map that can be written, with its directory and the files -wal and -shm beside it", .path.display())]
     ReadOnly {
         /// The file.
         path: PathBuf,
@@ -98,7 +104,7 @@ pub enum StoreError {
         next: VersionId,
     },
     /// A time of which only forgotten versions could tell.
-    #[error("what was seen at {time} is forgotten; ask for a time after version {next} was seen, or for a version")]
+    #[error("what the map knew of {time} is forgotten in part, with versions before {next}; ask for a version")]
     ForgottenTime {
         /// What was asked for.
         time: Timestamp,
@@ -114,7 +120,7 @@ pub enum StoreError {
         version: VersionId,
     },
     /// Not in the map at any version.
-    #[error("no feature {fid} at any version; \"resurvey query MAP\" lists the features of the newest")]
+    #[error("no feature {fid} at any version that is kept; \"resurvey query MAP\" lists the features of the newest")]
     NeverAFeature {
         /// What was asked for.
         fid: Fid,

@@ -4,7 +4,10 @@ use super::beside::Beside;
 use super::commit_error::CommitError;
 use super::error::{Fault, StoreError};
 use super::migrate::migrate;
-use super::on_disk::{has_write_ahead_log, immutable_uri, inspect, is_marked_read_only, unless_cut};
+use super::on_disk::{
+    Stamp, beside, has_right_to_write, has_write_ahead_log, immutable_uri, inspect, is_marked_read_only, may_write,
+    unless_cut,
+};
 use super::rows::{VersionRow, check_classes, head, insert_classes};
 use super::seal;
 use super::turn::{Turn, Turns};
@@ -32,10 +35,23 @@ pub struct MapFile {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
     writable: bool,
+    /// Of a map that was opened as one that nobody writes.
+    frozen: Option<Stamp>,
     beside: Cell<Beside>,
     /// Of a map that is open to write and has a write-ahead log.
     turns: OnceCell<Turns>,
     patience: Cell<Duration>,
+}
+
+/// How a map is opened that is only read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reading {
+    /// As by who writes.
+    Writable,
+    /// With the locks of SQLite.
+    Locked,
+    /// As if nobody wrote.
+    Frozen,
 }
 
 /// What a new map is made of.
@@ -94,6 +110,11 @@ impl MapFile {
         if is_marked_read_only(path) {
             return Err(StoreError::ReadOnly { path: path.to_owned() });
         }
+        for file in ["-wal", "-shm"].map(|suffix| beside(path, suffix)) {
+            if file.exists() && !has_right_to_write(&file) {
+                return Err(StoreError::ReadOnly { path: file });
+            }
+        }
         let map = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(|fault| fault.at(path));
         let map = unless_cut(path, map)?;
         map.beside.set(Beside::for_format(map.check_format()? as usize));
@@ -105,33 +126,43 @@ impl MapFile {
         Ok(map)
     }
 
-    /// Opens a map to read; also from a medium or directory that cannot be written.
+    /// Opens a map to read; also from a medium or directory that cannot be written. There a read is refused when somebody
+    /// else has written meanwhile.
     pub fn open_read_only(path: &Path) -> Result<Self, StoreError> {
         inspect(path)?;
-        let try_open = |immutable: bool| -> Result<Self, StoreError> {
-            let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
-            let map = if immutable {
-                Self::connect_to(path, immutable_uri(path), flags)
-            } else {
-                Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
-            };
-            let map = unless_cut(path, map.map_err(|fault| fault.at(path)))?;
-            map.beside.set(Beside::for_format(map.check_format()? as usize));
-            // What keeps the file from being read is said here.
-            map.read(|_| Ok(()))?;
-            Ok(map)
-        };
-        // Reading a file with a write-ahead log needs a shared-memory file beside it, unless nobody can write.
-        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if is_marked_read_only(directory) && !has_write_ahead_log(path) {
-            return try_open(true);
+        // Who reads a file with a write-ahead log needs files beside it. Where this user may not write they are left to
+        // those who may: files of another user would lock them out.
+        let may_write = may_write(path);
+        if !may_write && !has_write_ahead_log(path) && !beside(path, "-shm").exists() {
+            return Self::open_to_read(path, Reading::Frozen);
         }
-        match try_open(false) {
+        // Only a connection that could write takes those files away again.
+        let reading = if may_write { Reading::Writable } else { Reading::Locked };
+        match Self::open_to_read(path, reading) {
             Err(StoreError::NoWriteAheadLog { .. } | StoreError::ReadOnly { .. }) if !has_write_ahead_log(path) => {
-                try_open(true)
+                Self::open_to_read(path, Reading::Frozen)
             }
             other => other,
         }
+    }
+
+    fn open_to_read(path: &Path, reading: Reading) -> Result<Self, StoreError> {
+        let stamp = Stamp::of(path);
+        let map = match reading {
+            Reading::Writable => Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE),
+            Reading::Locked => Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY),
+            Reading::Frozen => {
+                let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
+                Self::connect_to(path, immutable_uri(path), flags)
+            }
+        };
+        let mut map = unless_cut(path, map.map_err(|fault| fault.at(path)))?;
+        map.writable = false;
+        map.frozen = (reading == Reading::Frozen).then_some(stamp);
+        map.beside.set(Beside::for_format(map.check_format()? as usize));
+        // What keeps the file from being read is said here.
+        map.read(|_| Ok(()))?;
+        Ok(map)
     }
 
     /// Waits this long for another writer instead of five seconds.
@@ -162,7 +193,7 @@ impl MapFile {
     /// Runs `work`, which reads one state of the file whatever is committed meanwhile, and says where it failed: in the
     /// transaction that is under way, or in one of its own.
     pub(super) fn read<T>(&self, work: impl FnOnce(&Connection) -> Result<T, Fault>) -> Result<T, StoreError> {
-        self.outside(|connection| {
+        let found = self.outside(|connection| {
             if !connection.is_autocommit() {
                 return work(connection);
             }
@@ -172,7 +203,12 @@ impl MapFile {
             frozen.commit()?;
             self.beside.set(beside);
             Ok(found)
-        })
+        });
+        match &self.frozen {
+            // Pages of two versions may have been read, and look like an answer or like damage.
+            Some(stamp) if !stamp.is_still(&self.path) => Err(StoreError::WrittenMeanwhile { path: self.path.clone() }),
+            _ => found,
+        }
     }
 
     /// Runs `work` in no transaction, and says where it failed.
@@ -298,6 +334,7 @@ impl MapFile {
             connection,
             path: path.to_owned(),
             writable,
+            frozen: None,
             beside: Cell::new(Beside::NotNeeded),
             turns: OnceCell::new(),
             patience: Cell::new(BUSY_TIMEOUT),

@@ -2,7 +2,8 @@
 
 use super::error::StoreError;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// Refuses what is plainly not a map before SQLite sees it.
 pub(super) fn inspect(path: &Path) -> Result<(), StoreError> {
@@ -57,11 +58,47 @@ pub(super) fn is_marked_read_only(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| metadata.permissions().readonly())
 }
 
+/// The file beside the map that SQLite names so.
+pub(super) fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let mut file = path.as_os_str().to_owned();
+    file.push(suffix);
+    file.into()
+}
+
 /// Whether something is in the log beside the map.
 pub(super) fn has_write_ahead_log(path: &Path) -> bool {
-    let mut log = path.as_os_str().to_owned();
-    log.push("-wal");
-    fs::metadata(log).is_ok_and(|metadata| metadata.len() > 0)
+    fs::metadata(beside(path, "-wal")).is_ok_and(|metadata| metadata.len() > 0)
+}
+
+/// Whether this user may write a map at `path`, by its marks and by the rights to it and its directory.
+pub(super) fn may_write(path: &Path) -> bool {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    [path, directory].into_iter().all(|place| !is_marked_read_only(place) && has_right_to_write(place))
+}
+
+#[cfg(unix)]
+pub(super) fn has_right_to_write(path: &Path) -> bool {
+    rustix::fs::access(path, rustix::fs::Access::WRITE_OK).is_ok()
+}
+
+#[cfg(not(unix))]
+pub(super) fn has_right_to_write(_path: &Path) -> bool {
+    true
+}
+
+/// What a file was when it was opened as one that nobody writes.
+#[derive(Debug)]
+pub(super) struct Stamp(Option<(u64, SystemTime)>);
+
+impl Stamp {
+    pub(super) fn of(path: &Path) -> Self {
+        Self(fs::metadata(path).ok().and_then(|metadata| Some((metadata.len(), metadata.modified().ok()?))))
+    }
+
+    /// Whether nobody has written since: every writer leaves something in the log before it touches the file.
+    pub(super) fn is_still(&self, path: &Path) -> bool {
+        !has_write_ahead_log(path) && self.0.is_some() && Self::of(path).0 == self.0
+    }
 }
 
 /// A URI that tells SQLite that nobody writes to the file.

@@ -8,6 +8,7 @@ use super::map_file::MapFile;
 use crate::version::{BoxMm, Delta, Digest, UpdateTransaction, VersionId, VersionKind, VersionRecord};
 use jiff::Timestamp;
 use resurvey_schema::ClassTable;
+use rusqlite::named_params;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
@@ -73,6 +74,8 @@ impl MapFile {
         let mut transaction = match undoing(self, wish) {
             Ok(transaction) => transaction,
             Err(CommitError::NothingToRevert { .. }) => return Ok(None),
+            // Nobody knows what it did, but nothing of it is left to be undone.
+            Err(CommitError::Store(StoreError::Forgotten { .. })) if !self.lives_on(wish.version)? => return Ok(None),
             Err(error) => return Err(error),
         };
         let head = self.head()?;
@@ -89,6 +92,16 @@ impl MapFile {
         }
         transaction.deltas = showing;
         Ok((!transaction.is_empty()).then_some(transaction))
+    }
+
+    /// Whether the newest version has a state that `version` brought.
+    fn lives_on(&self, version: VersionId) -> Result<bool, StoreError> {
+        const SQL: &str = "SELECT EXISTS (SELECT 1 FROM feature_version
+            WHERE from_version = :version AND to_version IS NULL) ORDER BY 1";
+        self.read(|connection| {
+            let mut statement = connection.prepare_cached(SQL)?;
+            Ok(statement.query_row(named_params! {":version": version.0 as i64}, |row| row.get(0))?)
+        })
     }
 }
 

@@ -78,7 +78,7 @@ pub(crate) fn is_tag_name(text: &str) -> bool {
         && !text.starts_with(['-', '.'])
         && !text.ends_with('.')
         && !text.contains("..")
-        && text != "head"
+        && !text.eq_ignore_ascii_case("head")
         && parse_number(text).is_none()
 }
 

@@ -25,8 +25,12 @@ pub(super) fn states(connection: &Connection, findings: &mut Findings) -> Result
     let mut statement = connection.prepare(SQL)?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
-        let (fid, from): (i64, i64) = (row.get("fid")?, row.get("from_version")?);
+        let (id, fid, from): (i64, i64, i64) = (row.get("id")?, row.get("fid")?, row.get("from_version")?);
         let place = || format!("feature {fid} from version {from}");
+        if id < 1 || fid < 1 || from < 1 {
+            let detail = format!("row {id} of feature {fid} from version {from}: expected numbers from 1");
+            findings.add(place(), detail);
+        }
         let state = match state(row, "state")? {
             Ok(state) => state,
             Err(detail) => {

@@ -22,7 +22,7 @@ pub(in crate::store) struct Source {
 /// What the index should have of a row.
 pub(super) enum Expected {
     At(Cell, Life),
-    /// The row does not say: its state has no box, its span is none, or it is in doubt.
+    /// The row does not say: its state has no box, its number or span is none, or it is in doubt.
     Unknown,
     /// The box does not fit around the origin.
     Outside,
@@ -38,7 +38,8 @@ impl Source {
     pub(super) fn expected(&self, row: &Row) -> Result<Expected, Fault> {
         let (id, first, to): (i64, i64, Option<i64>) = (row.get(0)?, row.get(2)?, row.get(3)?);
         let last = to.map_or(LIVE, |to| to.saturating_sub(1));
-        let is_span = (0..=last).contains(&first) && (to.is_none() || last < LIVE);
+        // A block cannot hold other ids.
+        let is_span = id >= 1 && (0..=last).contains(&first) && (to.is_none() || last < LIVE);
         let is_in_doubt = |version: i64| self.doubtful.contains(&VersionId(version.unsigned_abs()));
         let state = FeatureState::from_bytes(row.get_ref(4)?.as_blob().map_err(rusqlite::Error::from)?);
         let bounds = state.ok().and_then(|state| state.bounds().ok());

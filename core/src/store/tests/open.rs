@@ -89,6 +89,36 @@ fn an_existing_file_is_never_overwritten() {
 }
 
 #[test]
+fn what_is_read_without_locks_while_somebody_writes_is_no_answer() {
+    let scratch = Scratch::new();
+    scratch.add(0, &[chair(0.0)]).unwrap();
+    let (path, later) = (scratch.map.path().to_owned(), std::time::SystemTime::now() + Duration::from_secs(9));
+    drop(scratch.map);
+    let mut permissions = fs::metadata(&path).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(&path, permissions).unwrap();
+    let reader = MapFile::open_read_only(&path).unwrap();
+    assert_eq!(reader.head(), Ok(VersionId(1)));
+    assert!(!path.with_extension("rsv-shm").exists(), "a reader who may not write leaves nothing");
+    fs::File::open(&path).unwrap().set_modified(later).unwrap();
+    assert_eq!(reader.head(), Err(StoreError::WrittenMeanwhile { path: path.clone() }));
+    assert_eq!(MapFile::open_read_only(&path).unwrap().head(), Ok(VersionId(1)));
+    fs::write(path.with_extension("rsv-wal"), b"of a writer").unwrap();
+    assert_eq!(reader.fsck(), Err(StoreError::WrittenMeanwhile { path }));
+}
+
+#[test]
+fn a_reader_leaves_no_file_beside_the_map() {
+    let scratch = Scratch::new();
+    scratch.add(0, &[chair(0.0)]).unwrap();
+    let path = scratch.map.path().to_owned();
+    drop(scratch.map);
+    assert_eq!(MapFile::open_read_only(&path).unwrap().head(), Ok(VersionId(1)));
+    let left = ["rsv-wal", "rsv-shm"].map(|extension| path.with_extension(extension).exists());
+    assert_eq!(left, [false, false]);
+}
+
+#[test]
 fn a_read_only_file_can_be_read_and_not_written() {
     let scratch = Scratch::with_two_features();
     let path = scratch.map.path().to_owned();

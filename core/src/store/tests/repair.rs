@@ -221,3 +221,15 @@ fn a_version_with_a_number_beyond_all_is_named_and_not_counted_up_to() {
     assert!(problems.iter().any(|one| one.starts_with("versions: version 4: is missing")), "{problems:?}");
     assert_eq!(scratch.map.repair(), Ok(Vec::new()));
 }
+
+#[test]
+fn a_row_whose_number_no_index_can_hold_is_named_and_its_neighbours_stay_in_the_index() {
+    let scratch = eventful();
+    damage(&scratch, "UPDATE feature_version SET id = -1 WHERE id = 3");
+    let before = scratch.map.fsck().unwrap().len();
+    scratch.map.repair().unwrap();
+    let after = scratch.map.fsck().unwrap();
+    assert!(after.len() <= before, "{after:#?}");
+    assert!(after.iter().any(|one| one.to_string().contains("expected numbers from 1")), "{after:#?}");
+    assert!(!after.iter().any(|one| one.check == "index"), "{after:#?}");
+}
