@@ -19,6 +19,9 @@ const PLUGIN_PATH: &str = "RESURVEY_PLUGIN_PATH";
 /// The file in the user's data directory with a line for every crash of a plugin: what crashed twice is not started again.
 pub const CRASHED: &str = "crashed-plugins";
 
+/// Names that no plugin may have: what `--matcher`, `--set` and `eval` call something else.
+pub const RESERVED: [&str; 4] = [FUSED, GATE, SEARCH, "prior"];
+
 /// Names in `--set NAME.KEY=VALUE` that are not plugins.
 const GATE: &str = "gate";
 const SEARCH: &str = "search";
@@ -79,8 +82,12 @@ fn program_digest(path: &Path) -> Result<Digest, Failure> {
 
 /// The digest of a file of any size.
 fn file_digest(path: &Path) -> Result<Digest, Failure> {
-    let digest = std::fs::File::open(path).and_then(Digest::of_all);
-    digest.map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+    let wrong = |error: std::io::Error| Failure::input(format!("{}: {error}", path.display()));
+    // A pipe or device may have no end.
+    if !std::fs::metadata(path).map_err(wrong)?.is_file() {
+        return Err(wrong(std::io::Error::other("not a file")));
+    }
+    std::fs::File::open(path).and_then(Digest::of_all).map_err(wrong)
 }
 
 /// How plugins from files are kept apart.

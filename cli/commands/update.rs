@@ -18,14 +18,14 @@ use crate::tools::{self, Choices, Tool, registry};
 use jiff::Timestamp;
 use resurvey_core::capture::{Capture, GivenPose, read_given_pose};
 use resurvey_core::crs::Crs;
-use resurvey_core::localize::{GateLimits, Located, Matching, SceneServices, World, localize};
+use resurvey_core::localize::{GateLimits, Located, Matching, SceneServices, World, inside_building, localize};
 use resurvey_core::plugin::{Detector, Estimator, Kind};
 use resurvey_core::render::{inside_solid, view};
 use resurvey_core::store::{History, Made, MapFile};
 use resurvey_core::update::{Change, Comparison, Resolution, add_changes, pose_estimate, resolve};
 use resurvey_core::version::{
-    BoxMm, Decision, Delta, Gate, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction,
-    VersionId, VersionKind,
+    BoxMm, Decision, Delta, LocalizationEvidence, Observation, PluginUse, SearchRange, UpdateTransaction, VersionId,
+    VersionKind,
 };
 use resurvey_schema::{Localization, Pose};
 use serde_json::{Map, Value, json};
@@ -438,17 +438,10 @@ fn given_pose(world: &World, given: GivenPose, limits: &GateLimits) -> Located {
     let exact = exactly(pose);
     let covariance = covariance.unwrap_or(exact.covariance);
     let mut located = Located::new(Localization { covariance, alignment, ..exact }, limits);
-    let is_inside = inside_solid(world.scene(true), pose.position);
-    located.gates.push(Gate {
-        name: "inside-building".to_owned(),
-        measured: f64::from(u8::from(is_inside)),
-        limit: 0.0,
-        unit: "count".to_owned(),
-        passed: !is_inside,
-    });
-    if is_inside {
-        located.reasons.push("the pose that was given lies inside a building of the map".to_owned());
+    if inside_solid(world.scene(true), pose.position) {
+        return located.inside_building("the pose that was given");
     }
+    located.gates.push(inside_building(true));
     located
 }
 

@@ -58,6 +58,7 @@ fn what_cannot_be_combined_is_refused_with_the_reason() {
         ("fused.members=pixel+semantic", 12, &["semantic", "searches by itself"][..]),
         ("fused.members=pixel+aligned", 12, &["aligned is a detector"]),
         ("fused.members=pixel+magic", 11, &["magic"]),
+        ("fused.members=pixel:1e308+edges:1e308", 2, &["weights from 1e-6 to 1e6"]),
         ("fused.members=pixel:0", 2, &["pixel:1+edges:2", "pixel:0"]),
         ("fused.members=pixel+pixel", 2, &["each matcher once"]),
         ("fused.members=fused", 2, &["not fused itself"]),

@@ -182,6 +182,32 @@ fn a_file_that_others_may_write_is_not_installed_even_unchecked() {
 }
 
 #[test]
+fn a_pipe_is_no_plugin_and_nobody_waits_for_it() {
+    let user = User::new();
+    let directory = tempfile::tempdir().unwrap();
+    let pipe = directory.path().join("pipe");
+    if !Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
+        eprintln!("SKIPPED: mkfifo is missing");
+        return;
+    }
+    for words in [&["check"][..], &["install"], &["install", "--no-check"]] {
+        user.refused(&[words, &[text(&pipe)]].concat(), 10, &["not a file", "name a library"]);
+    }
+}
+
+#[test]
+fn a_name_that_means_something_else_is_taken() {
+    let user = User::new();
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("project");
+    for name in ["gate", "search", "prior", "fused"] {
+        let words = ["new", name, "--kind", "matcher", "--lang", "c", "--out", text(&out)];
+        user.refused(&words, 2, &[name, "resurvey uses itself"]);
+    }
+    assert!(!out.exists());
+}
+
+#[test]
 fn the_name_of_a_built_in_plugin_is_taken() {
     let user = User::new();
     let name = format!("{}resurvey_skyline{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);

@@ -114,8 +114,10 @@ fn what_is_on_the_map_by_now_is_not_accepted_again() {
     bench.json("proposals", &["accept", "2"]);
     bench.run("proposals", &["accept", "1"]).refused(21, &["is where proposal 1 puts its own", "proposals show 1"]);
     let taken = bench.run("proposals", &["accept", "1", "--json"]);
-    let fid = bench.json("query", &["--class", "banner"])["features"][0]["fid"].clone();
-    let there = json!([{"fid": fid, "changed_in": 2, "is_on_map": true, "is_target": false}]);
+    let banner = &bench.json("query", &["--class", "banner"])["features"][0];
+    let mut found = banner.clone();
+    found.as_object_mut().unwrap().retain(|key, _| !["fid", "from", "to"].contains(&key.as_str()));
+    let there = json!([{"fid": banner["fid"], "changed_in": 2, "is_on_map": true, "is_target": false, "found": found}]);
     let expected = json!({"decision": "conflict", "base_version": 1, "head": 2, "version": null, "conflicts": there,
         "looked_at_by": [], "id": 1, "status": "open"});
     assert_eq!((taken.code, taken.json()), (21, expected));

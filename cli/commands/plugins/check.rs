@@ -1,5 +1,6 @@
 //! `resurvey plugins check`: every promise of the plugin line, each in a process of its own.
 
+use super::installed::bytes_of;
 use super::{process, trial};
 use crate::args::{Check, Limits};
 use crate::console::Console;
@@ -46,8 +47,7 @@ struct Row {
 
 /// Makes every test on `file`.
 pub fn check(file: &Path, limits: Limits, console: &mut Console<'_>) -> Result<Checked, Failure> {
-    let unreadable = |error: std::io::Error| Failure::input(format!("{}: {error}", file.display()));
-    let sha256 = Digest::of(&std::fs::read(file).map_err(unreadable)?);
+    let sha256 = Digest::of(&bytes_of(file)?);
     let stage = console.stage("check");
     let mut rows: Vec<Row> = Vec::new();
     let mut is_closed = false;

@@ -1,11 +1,12 @@
 //! `resurvey plugins install`: checks a plugin file, copies it to the user's data directory and allows it.
 
 use super::check::{Checked, check};
-use super::installed::{Installed, Library, failure};
+use super::installed::{Installed, Library, bytes_of, failure};
 use crate::args::Install;
 use crate::console::Console;
 use crate::document;
 use crate::failure::{Failure, PLUGIN};
+use crate::tools::RESERVED;
 use anyhow::anyhow;
 use resurvey_core::plugin::{Digest, PluginError, PluginInfo, Registry};
 use resurvey_schema::wire::EXECUTABLE_PREFIX;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Installs a file. What is checked, hashed and kept is one copy, so that nobody can change it in between.
 pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) -> Result<u8, Failure> {
     let file = &options.file;
-    let bytes = std::fs::read(file).map_err(|error| failure(file, &error))?;
+    let bytes = bytes_of(file)?;
     // Its own permissions and header first: their messages name the file that the user knows.
     Registry::vet(file)?;
     let (info, is_executable) = Registry::inspect_bytes(file, &bytes)?;
@@ -24,6 +25,12 @@ pub fn run(options: &Install, registry: &Registry, console: &mut Console<'_>) ->
         return Err(refused(&format!(
             "{}: a built-in plugin is called {name}; build it under another name",
             file.display()
+        )));
+    }
+    if RESERVED.contains(&info.name.as_str()) {
+        let (file, name) = (file.display(), &info.name);
+        return Err(refused(&format!(
+            "{file}: {name} is a name that resurvey uses itself; build it under another name"
         )));
     }
     let installed = Installed::of_this_user()?;

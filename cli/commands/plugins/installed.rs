@@ -153,6 +153,14 @@ pub fn failure(path: &Path, error: &std::io::Error) -> Failure {
     Failure::input(format!("{}: {error}", path.display()))
 }
 
+/// The bytes of a plugin file; a pipe or device may have no end.
+pub fn bytes_of(path: &Path) -> Result<Vec<u8>, Failure> {
+    if !std::fs::metadata(path).map_err(|error| failure(path, &error))?.is_file() {
+        return Err(Failure::input(format!("{}: not a file; name a library or an executable", path.display())));
+    }
+    std::fs::read(path).map_err(|error| failure(path, &error))
+}
+
 /// The plugin file in the directory of a build.
 pub fn first_file(directory: &Path) -> Option<PathBuf> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(directory).ok()?.flatten().map(|entry| entry.path()).collect();

@@ -1,6 +1,6 @@
 //! `resurvey plugins list` and `resurvey plugins info`.
 
-use super::installed::{Older, builds_in, first_file};
+use super::installed::{Installed, Older, builds_in, first_file};
 use crate::console::Console;
 use crate::document;
 use crate::failure::Failure;
@@ -13,6 +13,7 @@ use serde_json::json;
 pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) -> Result<u8, Failure> {
     let plugins = registry.list();
     let older = data_directory().map(|data| builds_in(&data).1).unwrap_or_default();
+    let missing = Installed::of_this_user().ok().map(|installed| installed.plugins()).filter(|home| !home.exists());
     let path_of = |build: &Older| first_file(&build.directory).unwrap_or_else(|| build.directory.clone());
     if console.is_json() {
         let skipped: Vec<_> = (registry.skipped().iter())
@@ -22,6 +23,7 @@ pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) ->
         console.document(&json!({
             "plugins": plugins.iter().map(document::plugin_info).collect::<Vec<_>>(),
             "directories": directories,
+            "not_there_yet": missing.as_ref().map(|home| home.display().to_string()),
             "skipped": skipped,
             "older": older.iter().map(|build| json!({
                 "name": build.name, "sha256": build.sha256.to_string(), "path": path_of(build).display().to_string(),
@@ -45,6 +47,9 @@ pub fn list(registry: &Registry, is_verbose: bool, console: &mut Console<'_>) ->
     if is_verbose {
         for directory in registry.directories() {
             console.line(format_args!("searched {}", directory.display()))?;
+        }
+        if let Some(home) = &missing {
+            console.line(format_args!("searched {}, which is not there yet: nothing is installed", home.display()))?;
         }
         for skipped in registry.skipped() {
             console.line(&skipped.refusal)?;

@@ -5,6 +5,7 @@ use super::template::{self, Project};
 use crate::args::{Language, New, NewForm, NewKind};
 use crate::console::Console;
 use crate::failure::{Failure, INPUT};
+use crate::tools::RESERVED;
 use anyhow::anyhow;
 use resurvey_core::plugin::Registry;
 use serde_json::json;
@@ -139,6 +140,9 @@ fn is_free(name: &str, registry: &Registry) -> Result<(), Failure> {
     }
     if registry.list().iter().any(|plugin| plugin.builtin && plugin.name == name) {
         return Err(Failure::usage(format_args!("a built-in plugin is called {name}; take another name")));
+    }
+    if RESERVED.contains(&name) {
+        return Err(Failure::usage(format_args!("{name} is a name that resurvey uses itself; take another name")));
     }
     if TAKEN.contains(&name) {
         return Err(Failure::usage(format_args!(

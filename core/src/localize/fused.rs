@@ -8,6 +8,8 @@ use crate::plugin::{Digest, Kind, Matcher, MatcherForm, PluginError, PluginInfo}
 pub const FUSED: &str = "fused";
 
 /// Of this way of combining, as the evidence records it.
+/// The weights that a member may have: beyond them sums are no numbers any more.
+const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What finds poses: a matcher, or several that the host combines.
@@ -43,7 +45,9 @@ pub struct Fused {
 #[non_exhaustive]
 pub enum FusedError {
     /// Not a list of matchers.
-    #[error("fused.members={text}: expected names with weights above 0, such as pixel:1+edges:2; found {found:?}")]
+    #[error(
+        "fused.members={text}: expected names with weights from 1e-6 to 1e6, such as pixel:1+edges:2; found {found:?}"
+    )]
     Members {
         /// The whole list.
         text: String,
@@ -74,7 +78,7 @@ pub fn named_members(text: &str) -> Result<Vec<(String, f64)>, FusedError> {
     for part in text.split('+') {
         let (name, weight) = part.split_once(':').unwrap_or((part, "1"));
         let (name, weight) = (name.trim(), weight.trim().parse::<f64>());
-        let weight = weight.ok().filter(|weight| *weight > 0.0 && weight.is_finite() && !name.is_empty());
+        let weight = weight.ok().filter(|weight| WEIGHTS.contains(weight) && !name.is_empty());
         let Some(weight) = weight else {
             return Err(FusedError::Members { text: text.to_owned(), found: part.to_owned() });
         };

@@ -6,6 +6,7 @@ use super::panel::Panel;
 use super::search::{SearchLimits, search};
 use super::services::SceneServices;
 use crate::plugin::{MatcherForm, PhotoInput, PluginError, Services};
+use crate::render::inside_solid;
 use crate::version::Gate;
 use resurvey_schema::Localization;
 
@@ -28,9 +29,27 @@ impl Located {
         Self { localization, gates, reasons }
     }
 
+    /// The same, of a pose inside a building: what it sees from there is no street. `pose` says whose it is.
+    pub fn inside_building(mut self, pose: &str) -> Self {
+        self.gates.push(inside_building(false));
+        self.reasons.push(format!("{pose} lies inside a building of the map"));
+        self
+    }
+
     /// Whether every gate passed.
     pub fn is_reliable(&self) -> bool {
         self.reasons.is_empty()
+    }
+}
+
+/// The gate on whether a pose is outside of every building.
+pub fn inside_building(passed: bool) -> Gate {
+    Gate {
+        name: "inside-building".to_owned(),
+        measured: f64::from(u8::from(!passed)),
+        limit: 0.0,
+        unit: "count".to_owned(),
+        passed,
     }
 }
 
@@ -52,5 +71,8 @@ pub fn localize(
         Matching::Fused(fused) => search(&mut fused.panel(), services, search_limits)?,
     };
     services.progress(1.0);
-    Ok(Located::new(localization, limits))
+    let located = Located::new(localization, limits);
+    // A search of the host tries none there; a plugin that searches by itself may.
+    let is_inside = inside_solid(services.world().scene(true), located.localization.pose.position);
+    Ok(if is_inside { located.inside_building("the pose that the matcher found") } else { located })
 }

@@ -22,7 +22,7 @@ pub use exhaustive::{Exhaustive, ExhaustiveRequest, Score, exhaustive};
 pub use fused::{FUSED, Fused, FusedError, Matching, Member, named_members};
 pub use gate::{GATE_KEYS, GateLimits};
 pub use heatmap::{HeatMap, HeatMapError, heat_map};
-pub use locate::{Located, localize};
+pub use locate::{Located, inside_building, localize};
 pub use search::SearchLimits;
 pub use services::{SceneServices, Silent};
 pub use world::World;

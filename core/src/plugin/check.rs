@@ -14,6 +14,12 @@ const NORMAL_TOLERANCE: f64 = 1e-6;
 const SYMMETRY_TOLERANCE: f64 = 1e-9;
 /// How far below zero a correlation matrix may reach, likewise: rounding, and what a plugin wrote with nine digits.
 const DEFINITE_TOLERANCE: f64 = 1e-6;
+/// How far a position may be from the origin of the map's frame, metres: that of every projected system is nearer.
+const FARTHEST_M: f64 = 1e8;
+/// How far an angle may be from zero, radians: a thousand turns.
+const LARGEST_RAD: f64 = 1e3 * std::f64::consts::TAU;
+/// How far what an estimator places or removes may be from the camera, and how unsure of it, metres: no photo shows more.
+const FARTHEST_SEEN_M: f64 = 10_000.0;
 /// Characters of the texts that the map keeps: a name, and a unit.
 const LONGEST_NAME: usize = 64;
 const LONGEST_UNIT: usize = 16;
@@ -57,6 +63,14 @@ fn finite(field: &str, values: &[f64]) -> Checked {
 
 fn not_negative(field: &str, value: f64) -> Checked {
     if value.is_finite() && value >= 0.0 { Ok(()) } else { violation(field, &value, "a finite number of at least 0") }
+}
+
+fn at_most(field: &str, unit: &str, limit: f64, values: &[f64]) -> Checked {
+    finite(field, values)?;
+    match values.iter().find(|value| value.abs() > limit) {
+        None => Ok(()),
+        Some(value) => violation(field, &format_args!("{value:e}"), format!("at most {limit:.0} {unit} from zero")),
+    }
 }
 
 /// No direction has a variance below zero: the correlations, which have no units, are those of a covariance.
@@ -114,7 +128,9 @@ pub(super) fn labels(labels: &LabelImage, classes: &ClassTable) -> Checked {
 
 pub(super) fn localization(found: &Localization) -> Checked {
     ratio("score", found.score)?;
-    finite("pose", &<[f64; 6]>::from(found.pose))?;
+    let [e, n, h, yaw, pitch, roll] = found.pose.into();
+    at_most("pose", "m", FARTHEST_M, &[e, n, h])?;
+    at_most("pose", "rad", LARGEST_RAD, &[yaw, pitch, roll])?;
     let c = &found.covariance;
     finite("covariance", c.as_flattened())?;
     let largest = c.as_flattened().iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
@@ -139,7 +155,36 @@ pub(super) fn localization(found: &Localization) -> Checked {
         not_negative("runner_up.distance_m", runner_up.distance_m)?;
         ratio("runner_up.score_ratio", runner_up.score_ratio)?;
     }
-    found.heat.iter().enumerate().try_for_each(|(index, cell)| finite(&format!("heat[{index}]"), cell))
+    found.heat.iter().enumerate().try_for_each(|(index, [e, n, score])| {
+        let field = format!("heat[{index}]");
+        at_most(&field, "m", FARTHEST_M, &[*e, *n])?;
+        finite(&field, &[*score])
+    })
+}
+
+/// What an estimator places or removes is where a photo that was taken at `camera` may show it, and known well enough.
+pub(super) fn in_sight(proposals: &[Proposal], camera: GridPoint) -> Checked {
+    let near = |field: String, at: GridPoint| {
+        let ([e, n, h], [e0, n0, h0]) = (<[f64; 3]>::from(at), <[f64; 3]>::from(camera));
+        let distance_m = (e - e0).hypot(n - n0).hypot(h - h0);
+        if distance_m <= FARTHEST_SEEN_M {
+            return Ok(());
+        }
+        violation(field, &format_args!("{distance_m:.0} m from the camera"), format!("at most {FARTHEST_SEEN_M:.0} m"))
+    };
+    proposals.iter().enumerate().try_for_each(|(index, proposal)| {
+        let field = |name: &str| format!("proposal[{index}].{name}");
+        match proposal {
+            Proposal::Place { descriptor: Descriptor::Material(material), .. } => {
+                material.corners.into_iter().try_for_each(|corner| near(field("descriptor.corners"), corner))
+            }
+            Proposal::Place { descriptor: Descriptor::Dynamic(dynamic), .. } => {
+                near(field("descriptor.position"), dynamic.position)
+            }
+            Proposal::Remove { near: place, .. } => near(field("near"), *place),
+            Proposal::Reject { .. } => Ok(()),
+        }
+    })
 }
 
 impl Rules<'_> {
@@ -239,7 +284,7 @@ impl Rules<'_> {
             Descriptor::Dynamic(dynamic) => {
                 self.kind(&format!("{field}.class"), dynamic.class, ClassKind::Dynamic)?;
                 point(&format!("{field}.position"), dynamic.position)?;
-                finite(&format!("{field}.yaw_rad"), dynamic.yaw_rad.as_slice())?;
+                at_most(&format!("{field}.yaw_rad"), "rad", LARGEST_RAD, dynamic.yaw_rad.as_slice())?;
                 if let Some(size) = dynamic.size_m.iter().find(|size| !(size.is_finite() && **size > 0.0)) {
                     return violation(format!("{field}.size_m"), &size, "a finite number above 0");
                 }
@@ -247,7 +292,10 @@ impl Rules<'_> {
         }
         if let Some(Uncertainty { position_m, size_m, area_m2 }) = descriptor.sigma() {
             let sigmas = [Some(position_m), size_m, area_m2].into_iter().flatten();
-            sigmas.into_iter().try_for_each(|sigma| not_negative(&format!("{field}.sigma"), sigma))?;
+            sigmas.into_iter().try_for_each(|sigma| {
+                not_negative(&format!("{field}.sigma"), sigma)?;
+                at_most(&format!("{field}.sigma"), "m", FARTHEST_SEEN_M, &[sigma])
+            })?;
         }
         // What the map would not take later is the plugin's doing, and told as that.
         let state = FeatureState::Descriptor(descriptor.clone());
@@ -269,5 +317,65 @@ fn not_for_the_map(field: &str, invalid: &InvalidState) -> Checked {
             format!("at most {limit_m:.3} m"),
         ),
         other => violation(field, &other, "what a map can hold"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use resurvey_schema::{DynamicDescriptor, Pose};
+
+    fn found([e, n, h, yaw_rad, pitch_rad, roll_rad]: [f64; 6], heat: Vec<[f64; 3]>) -> Localization {
+        Localization {
+            pose: Pose { position: GridPoint::new(e, n, h), yaw_rad, pitch_rad, roll_rad },
+            score: 0.9,
+            covariance: [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 1e-4]],
+            alignment: None,
+            runner_up: None,
+            candidates: 1,
+            skipped: 0,
+            heat,
+        }
+    }
+
+    #[test]
+    fn a_pose_that_is_nowhere_on_earth_is_no_answer() {
+        let street = [835_548.0, 817_800.0, 6.0, 3.9, 0.0, 0.0];
+        assert_eq!(localization(&found(street, vec![[835_548.0, 817_800.0, 0.5]])), Ok(()));
+        for (axis, value, expected) in [
+            (0, 1e300, "at most 100000000 m from zero"),
+            (1, -1.1e8, "at most 100000000 m from zero"),
+            (3, 1e300, "at most 6283 rad from zero"),
+            (5, f64::NAN, "a finite number"),
+        ] {
+            let mut pose = street;
+            pose[axis] = value;
+            let violation = localization(&found(pose, Vec::new())).unwrap_err();
+            assert_eq!((violation.field.as_str(), violation.expected.as_str()), ("pose", expected), "{value}");
+        }
+        let far = localization(&found(street, vec![[0.0; 3], [8e8, 0.0, 0.5]])).unwrap_err();
+        assert_eq!((far.field.as_str(), far.value.as_str()), ("heat[1]", "8e8"));
+    }
+
+    #[test]
+    fn what_no_photo_can_show_is_no_proposal() {
+        let camera = GridPoint::new(835_548.0, 817_800.0, 6.0);
+        let place = |easting: f64| Proposal::Place {
+            region: 0,
+            descriptor: Descriptor::Dynamic(DynamicDescriptor {
+                class: ClassId(4),
+                position: GridPoint::new(easting, 817_800.0, 4.5),
+                size_m: [0.5, 0.5, 1.7],
+                yaw_rad: None,
+                sigma: None,
+            }),
+        };
+        assert_eq!(in_sight(&[place(835_560.0)], camera), Ok(()));
+        let violation = in_sight(&[place(835_560.0), place(1_530.0)], camera).unwrap_err();
+        assert_eq!(violation.field, "proposal[1].descriptor.position");
+        assert_eq!(
+            (violation.value.as_str(), violation.expected.as_str()),
+            ("834018 m from the camera", "at most 10000 m")
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! Matchers, detectors and estimators as the rest of core calls them. Every answer is checked before it is given on.
 #![allow(unsafe_code)]
 
+use super::check;
 use super::error::PluginError;
 use super::info::PluginInfo;
 use super::input::{ComparisonInput, PhotoInput, ViewImages};
@@ -206,14 +207,25 @@ impl Estimator {
         if let Some(text) = lend::size_conflict(input) {
             return self.0.not_called(text);
         }
-        let instance = match &mut self.0 {
-            Body::Here(instance) => instance,
-            Body::Apart(instance) => return instance.estimate(services, input, regions),
+        let proposals = match &mut self.0 {
+            Body::Here(instance) => {
+                let lent = LentComparison::new(input);
+                let records: Vec<_> = regions.iter().map(lend::region).collect();
+                // SAFETY: what comparison and records point to lives in this block, or is borrowed for longer.
+                unsafe { line::estimate(instance, services, &lent.record(), &records) }?
+            }
+            Body::Apart(instance) => instance.estimate(services, input, regions)?,
         };
-        let lent = LentComparison::new(input);
-        let records: Vec<_> = regions.iter().map(lend::region).collect();
-        // SAFETY: what comparison and records point to lives in this function, or is borrowed for longer.
-        unsafe { line::estimate(instance, services, &lent.record(), &records) }
+        check::in_sight(&proposals, input.estimate.pose.position).map_err(
+            |check::Violation { field, value, expected }| PluginError::InvalidOutput {
+                plugin: self.info().name.clone(),
+                call: "estimate",
+                field,
+                value,
+                expected,
+            },
+        )?;
+        Ok(proposals)
     }
 
     /// As [`Matcher::finish`].

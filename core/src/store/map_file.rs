@@ -136,8 +136,9 @@ impl MapFile {
         if !may_write && !has_write_ahead_log(path) && !beside(path, "-shm").exists() {
             return Self::open_to_read(path, Reading::Frozen);
         }
-        // Only a connection that could write takes those files away again.
-        let reading = if may_write { Reading::Writable } else { Reading::Locked };
+        // Only a connection that could write takes those files away again. A log that somebody has left is for a writer to
+        // put into the file.
+        let reading = if may_write && !has_write_ahead_log(path) { Reading::Writable } else { Reading::Locked };
         match Self::open_to_read(path, reading) {
             Err(StoreError::NoWriteAheadLog { .. } | StoreError::ReadOnly { .. }) if !has_write_ahead_log(path) => {
                 Self::open_to_read(path, Reading::Frozen)

@@ -25,7 +25,10 @@ impl PluginBuild {
     /// Whether `used` is such a build.
     pub fn is(&self, used: &PluginUse) -> bool {
         match self {
-            Self::Hash(digits) => used.sha256.is_some_and(|digest| digest.to_string().starts_with(digits)),
+            // A name may look like digits.
+            Self::Hash(digits) => {
+                used.name == *digits || used.sha256.is_some_and(|digest| digest.to_string().starts_with(digits))
+            }
             Self::Named { name, version } => {
                 used.name == *name && version.as_ref().is_none_or(|version| used.version == *version)
             }
@@ -86,6 +89,8 @@ mod tests {
         let is = |text: &str| text.parse::<PluginBuild>().unwrap().is(&used);
         assert!(is("abababab") && is("ABABABABAB") && is(&"ab".repeat(32)) && is("semantic") && is("semantic@0.1.0"));
         assert!(!is("babababa") && !is("semantic@0.1.1") && !is("skyline"));
+        let named = PluginUse { name: "deadbeef01".to_owned(), ..used.clone() };
+        assert!("deadbeef01".parse::<PluginBuild>().unwrap().is(&named) && !is("deadbeef01"));
         // Seven digits are a name.
         assert_eq!("abababa".parse::<PluginBuild>().unwrap().to_string(), "abababa");
         assert!(!is("abababa"));
