@@ -3,7 +3,6 @@
 use super::error::StoreError;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 /// Refuses what is plainly not a map before SQLite sees it.
 pub(super) fn inspect(path: &Path) -> Result<(), StoreError> {
@@ -88,17 +87,32 @@ pub(super) fn has_right_to_write(_path: &Path) -> bool {
 
 /// What a file was when it was opened as one that nobody writes.
 #[derive(Debug)]
-pub(super) struct Stamp(Option<(u64, SystemTime)>);
+pub(super) struct Stamp(Option<Marks>);
+
+/// Length, number in the file system, and seconds and nanoseconds of the last write.
+type Marks = (u64, u64, i64, i64);
 
 impl Stamp {
     pub(super) fn of(path: &Path) -> Self {
-        Self(fs::metadata(path).ok().and_then(|metadata| Some((metadata.len(), metadata.modified().ok()?))))
+        Self(fs::metadata(path).ok().map(|metadata| marks(&metadata)))
     }
 
     /// Whether nobody has written since: every writer leaves something in the log before it touches the file.
     pub(super) fn is_still(&self, path: &Path) -> bool {
         !has_write_ahead_log(path) && self.0.is_some() && Self::of(path).0 == self.0
     }
+}
+
+#[cfg(unix)]
+fn marks(metadata: &fs::Metadata) -> Marks {
+    use std::os::unix::fs::MetadataExt;
+    (metadata.len(), metadata.ino(), metadata.mtime(), metadata.mtime_nsec())
+}
+
+/// Elsewhere every user who reads may lock.
+#[cfg(not(unix))]
+fn marks(metadata: &fs::Metadata) -> Marks {
+    (metadata.len(), 0, 0, 0)
 }
 
 /// A URI that tells SQLite that nobody writes to the file.
