@@ -2,13 +2,11 @@
 //! who means it meets them, and keep a bug of a plugin from becoming an overflow or endless work of the host.
 
 use crate::camera::Camera;
-use crate::plugin::ServiceError;
+use crate::plugin::{LARGEST_RAD, ServiceError};
 use crate::version::BoxMm;
 use resurvey_schema::service::{CompareRequest, PanoramaRequest};
 use resurvey_schema::{GridPoint, Pose};
 
-/// How far an angle may be from zero, radians: a thousand turns.
-const LARGEST_RAD: f64 = 1e3 * std::f64::consts::TAU;
 /// The widest boundary tolerance, pixels of the compared image: wider ones need an image in memory for each pixel, and
 /// all boundaries match.
 const WIDEST_PX: f64 = 100.0;

@@ -17,7 +17,7 @@ const DEFINITE_TOLERANCE: f64 = 1e-6;
 /// How far a position may be from the origin of the map's frame, metres: that of every projected system is nearer.
 const FARTHEST_M: f64 = 1e8;
 /// How far an angle may be from zero, radians: a thousand turns.
-const LARGEST_RAD: f64 = 1e3 * std::f64::consts::TAU;
+pub(crate) const LARGEST_RAD: f64 = 1e3 * std::f64::consts::TAU;
 /// How far what an estimator places or removes may be from the camera, and how unsure of it, metres: no photo shows more.
 const FARTHEST_SEEN_M: f64 = 10_000.0;
 /// Characters of the texts that the map keeps: a name, and a unit.

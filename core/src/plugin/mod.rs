@@ -33,6 +33,7 @@ mod settings;
 mod trust;
 mod user_file;
 
+pub(crate) use check::LARGEST_RAD;
 pub use crashes::CrashLog;
 pub use error::{PluginError, Refusal, Stage};
 pub use info::{Digest, InvalidDigest, Kind, PluginInfo};
